@@ -68,8 +68,7 @@ fn recorded(index: u64) -> Vec<ExternalDetection> {
     (0..8)
         .map(|k| {
             let x = 300.0 + 200.0 * ((index as f64) * 0.02 + k as f64).sin();
-            let region = Some(Rect::new(x, 120.0 + 8.0 * k as f64, 70.0, 190.0));
-            ExternalDetection { region, head: None, score: 0.95 }
+            ExternalDetection::in_image(Rect::new(x, 120.0 + 8.0 * k as f64, 70.0, 190.0), 0.95)
         })
         .collect()
 }

@@ -60,7 +60,7 @@ fn main() {
     let [log, out, extent, inputs] = &words[..] else { panic!("LOG OUT.csv EXTENT INPUTS") };
     let config: Config = toml::from_str(&settings.join("\n")).expect("settings are KEY=VALUE");
     let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
-    let context = Context { seed: 1, base_dir: PathBuf::new(), wheels };
+    let context = Context::new(1, PathBuf::new(), wheels);
     let mut detector = HogUpperBody::new(config, &context).expect("the settings are right");
     let mut frames = source(Path::new(log), inputs == "depth");
     let mut text = String::new();

@@ -44,7 +44,7 @@ fn settings<C: DeserializeOwned>(words: &[String]) -> C {
 
 fn detector(name: &str, words: &[String]) -> Box<dyn Detector> {
     let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
-    let context = Context { seed: 1, base_dir: PathBuf::new(), wheels };
+    let context = Context::new(1, PathBuf::new(), wheels);
     let detector: tagalong_core::Result<Box<dyn Detector>> = match name {
         "face-rgbd" => FaceRgbd::new(settings(words), &context).map(|it| Box::new(it) as _),
         _ => HogUpperBody::new(settings(words), &context).map(|it| Box::new(it) as _),

@@ -27,7 +27,7 @@ fn main() -> Result<()> {
     let mut filter = PerPerson::new(Ekf::new(Config::default())?);
     filter.start(TrackId(1), &seen, &camera);
     let matched = [Matched::certain(TrackId(1), &seen)];
-    let evidence = Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
+    let evidence = Evidence::new(&frame, &matched);
     filter.update(&evidence)?;
     let us = median_us(|| {
         filter.predict(&motion, &camera);

@@ -51,7 +51,7 @@ fn step() -> Result<f64> {
         Detection::new("example", Point3::new(3.0, 0.0, 1.6), Matrix3::identity() * 0.01, 1.0);
     filter.start(TrackId(1), &first, &camera);
     let likelihood: Option<&dyn Likelihood> = Some(&Wide);
-    let evidence = Evidence { frame: &frame, matched: &[], unmatched: &[], likelihood };
+    let evidence = Evidence::new(&frame, &[]).with_likelihood(likelihood);
     filter.update(&evidence)?;
     Ok(median_us(|| {
         filter.predict(&motion, &camera);

@@ -48,7 +48,7 @@ struct Grid {
 
 impl Detector for Grid {
     fn capabilities(&self) -> Capabilities {
-        Capabilities { inputs: Inputs::NONE, discovers: true, tracks: false, weighs: false }
+        Capabilities::new(Inputs::NONE).discovering()
     }
 
     fn detect(&mut self, frame: &Frame, _: &Query<'_>, _: &mut Funnel) -> Result<Vec<Detection>> {

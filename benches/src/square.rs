@@ -48,15 +48,6 @@ pub fn track(camera: &Camera, sigma_m: f64) -> Track {
     let head = Point3::new(3.0, 0.0, 1.35);
     let region = camera.upper_body(&head);
     let person = Person { position: head, velocity: Vector2::zeros() };
-    let estimate = Estimate { person, covariance: SMatrix::identity() * sigma_m.powi(2), region };
-    Track {
-        id: TrackId(1),
-        estimate,
-        seen: true,
-        occluded: false,
-        confirmed: true,
-        age: 9,
-        unseen_s: 0.0,
-        score: 2.0,
-    }
+    let estimate = Estimate::new(person, SMatrix::identity() * sigma_m.powi(2), region);
+    Track::new(TrackId(1), estimate, 2.0).with_age(9)
 }

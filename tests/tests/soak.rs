@@ -74,10 +74,11 @@ fn s3_an_empty_room_for_ten_minutes_takes_no_memory() {
 /// Returns boxes of people that another program found, all over the image.
 fn boxes(count: usize) -> Vec<ExternalDetection> {
     (0..count)
-        .map(|at| ExternalDetection {
-            region: Some(Rect::new((at % 150) as f64, (at / 150 % 110) as f64, 10.0, 10.0)),
-            head: None,
-            score: 0.5 + 0.4 * (at % 97) as f64 / 97.0,
+        .map(|at| {
+            ExternalDetection::in_image(
+                Rect::new((at % 150) as f64, (at / 150 % 110) as f64, 10.0, 10.0),
+                0.5 + 0.4 * (at % 97) as f64 / 97.0,
+            )
         })
         .collect()
 }

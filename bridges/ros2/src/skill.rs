@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
-use tagalong::pipeline::{Choice, Enrollment, FollowStatus, Permission};
+use tagalong::pipeline::{Enrollment, FollowStatus, Permission};
 
 /// Longest wait for an answer of the pipeline.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -34,13 +34,7 @@ impl fmt::Display for Verb {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Clear => write!(f, "clear"),
-            Self::Enroll(Enrollment { person, .. }) => match person {
-                Choice::Track(id) => write!(f, "enroll track {}", id.0),
-                Choice::Point([x, y]) => write!(f, "enroll the person at ({x}, {y})"),
-                Choice::Nearest => write!(f, "enroll the nearest person in front"),
-                Choice::Approach => write!(f, "enroll the person that walks up"),
-                Choice::RaisedHand => write!(f, "enroll the person that raises a hand"),
-            },
+            Self::Enroll(Enrollment { person, .. }) => write!(f, "enroll {person}"),
         }
     }
 }
@@ -191,6 +185,8 @@ impl Desk {
 #[cfg(test)]
 mod tests {
     use std::thread;
+
+    use tagalong::pipeline::Choice;
 
     use super::*;
 

@@ -51,12 +51,7 @@ struct NearestThing {
 
 impl Detector for NearestThing {
     fn capabilities(&self) -> Capabilities {
-        Capabilities {
-            inputs: Inputs::NONE.require(Input::Depth),
-            discovers: true,
-            tracks: false,
-            weighs: false,
-        }
+        Capabilities::new(Inputs::NONE.require(Input::Depth)).discovering()
     }
 
     fn detect(&mut self, frame: &Frame, _: &Query<'_>, _: &mut Funnel) -> Result<Vec<Detection>> {

@@ -7,6 +7,7 @@ use std::path::Path;
 
 /// Largest number of bytes that is read of a file, by its kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum FileLimit {
     /// Configs, scenes, settings of trainers: 1 MiB.
     Config,

@@ -1,5 +1,6 @@
 /// Network of a plugin as an ONNX file ([`crate::Registry::exporter`]).
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct ExportedNetwork {
     /// Content of the file.
     pub onnx: Vec<u8>,
@@ -10,8 +11,17 @@ pub struct ExportedNetwork {
     pub sample: Vec<NamedTensor>,
 }
 
+impl ExportedNetwork {
+    /// Creates the network: the content of its file, its card as TOML, and an input with the outputs
+    /// that the plugin itself computes for it.
+    pub fn new(onnx: Vec<u8>, card: String, sample: Vec<NamedTensor>) -> Self {
+        Self { onnx, card, sample }
+    }
+}
+
 /// Input or output of an exported network.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct NamedTensor {
     /// Name in the file.
     pub name: &'static str,

@@ -9,6 +9,34 @@
 //! * [`path_text`]: paths in JSON, of any bytes.
 //! * [`OrAuto`]: a setting that is one of several words, or `auto`.
 //! * [`ConfigError`]: a mistake with its place in the text.
+//!
+//! # Crates of others in public signatures
+//!
+//! Settings implement traits of `serde` and `schemars`, and values of a config are those of `toml`.
+//! The versions that Tagalong uses are re-exported as [`serde`], [`schemars`] and [`toml`]; another
+//! major version of one of them is a breaking change of this crate. A plugin that takes them from
+//! here needs no dependencies of its own, and never has a version that does not fit:
+//!
+//! ```
+//! use tagalong_config::schemars::JsonSchema;
+//! use tagalong_config::serde::{Deserialize, Serialize};
+//! use tagalong_config::{check_settings, toml};
+//!
+//! /// Settings of a plugin.
+//! #[derive(Default, Serialize, Deserialize, JsonSchema)]
+//! #[serde(crate = "tagalong_config::serde", default, deny_unknown_fields)]
+//! #[schemars(crate = "tagalong_config::schemars")]
+//! struct Config {
+//!     /// Distance from which people are found, m.
+//!     #[schemars(range(min = 0.5))]
+//!     near_m: f64,
+//! }
+//!
+//! let config: Config = toml::from_str("near_m = 0.2")?;
+//! let refused = check_settings(&config).unwrap_err().to_string();
+//! assert!(refused.contains("near_m"), "{refused}");
+//! # Ok::<(), toml::de::Error>(())
+//! ```
 
 mod bounded;
 mod exported;
@@ -20,6 +48,8 @@ mod registry;
 mod settings;
 mod trainer;
 mod xml;
+
+pub use {schemars, serde, toml};
 
 pub use bounded::{FileLimit, read_bytes, read_text};
 pub use exported::{ExportedNetwork, NamedTensor};

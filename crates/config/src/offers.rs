@@ -51,9 +51,18 @@ pub enum TrainingData {
 
 /// Training of the model of a plugin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct TrainingOffer {
     /// Examples that the trainer learns from.
     pub data: TrainingData,
     /// Settings of a quick trial, as TOML: fewer combinations.
     pub quick_settings: &'static str,
+}
+
+impl TrainingOffer {
+    /// Creates the offer: the examples that the trainer learns from, and the settings of a quick trial,
+    /// as TOML.
+    pub const fn new(data: TrainingData, quick_settings: &'static str) -> Self {
+        Self { data, quick_settings }
+    }
 }

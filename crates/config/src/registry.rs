@@ -52,6 +52,7 @@ impl Kind {
 
 /// Information available to a plugin when it is built.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Context {
     /// The seed of the run, already mixed with the plugin's place in the config.
     pub seed: u64,
@@ -62,6 +63,12 @@ pub struct Context {
 }
 
 impl Context {
+    /// Creates the information for a plugin: the seed of the run, the directory of the config, and the
+    /// drive of the robot.
+    pub fn new(seed: u64, base_dir: impl Into<PathBuf>, wheels: DiffDrive) -> Self {
+        Self { seed, base_dir: base_dir.into(), wheels }
+    }
+
     /// Returns a learned model: that of `file`, a path relative to the config, or the plugin's
     /// built-in one if the config names no file.
     ///

@@ -25,6 +25,7 @@ pub struct NoSettings {}
 /// An error in a config, with its place in the text.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{message}")]
+#[non_exhaustive]
 pub struct ConfigError {
     /// Description of the error and of valid values.
     pub message: String,
@@ -624,11 +625,11 @@ mod tests {
     #[test]
     fn the_first_setting_out_of_its_range_is_named() {
         type Change<'a> = &'a dyn Fn(&mut Ranges);
-        let says = |change: Change<'_>| {
+        fn says(change: Change<'_>) -> String {
             let mut ranges = Ranges::default();
             change(&mut ranges);
             check_settings(&ranges).map_or_else(|error| error.to_string(), |()| "fine".into())
-        };
+        }
         assert_eq!(says(&|_| ()), "fine");
         assert_eq!(says(&|r| r.positive = 1e6), "fine");
         assert_eq!(says(&|r| r.list = vec![0.5, 9.0]), "fine");

@@ -14,6 +14,7 @@ pub struct Example {
 
 /// Annotated person in a frame, for trainers of detectors.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct AnnotatedPerson {
     /// Centre of the head in the robot frame, m.
     pub head: Point3<f64>,
@@ -23,8 +24,26 @@ pub struct AnnotatedPerson {
     pub visible: f64,
 }
 
+impl AnnotatedPerson {
+    /// Creates a person at a centre of the head in the robot frame, m, who counts and is all visible.
+    pub fn new(head: Point3<f64>) -> Self {
+        Self { head, counts: true, visible: 1.0 }
+    }
+
+    /// Returns the person with [`AnnotatedPerson::counts`] as given.
+    pub fn with_counts(self, counts: bool) -> Self {
+        Self { counts, ..self }
+    }
+
+    /// Returns the person with the visible fraction of the upper body, 0 to 1.
+    pub fn with_visible(self, visible: f64) -> Self {
+        Self { visible, ..self }
+    }
+}
+
 /// Result of a fit.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Fitted {
     /// Content of the model file, in the plugin's format.
     pub model: String,
@@ -33,6 +52,19 @@ pub struct Fitted {
     pub figures: toml::Table,
     /// Content of further model files, each by the name of the real room that it has not seen.
     pub without: Vec<(String, String)>,
+}
+
+impl Fitted {
+    /// Creates the result of a fit: the content of the model file, and figures for the model card.
+    pub fn new(model: String, figures: toml::Table) -> Self {
+        Self { model, figures, without: Vec::new() }
+    }
+
+    /// Returns the result with further model files, each by the name of the real room that it has not
+    /// seen.
+    pub fn with_rooms_left_out(self, without: Vec<(String, String)>) -> Self {
+        Self { without, ..self }
+    }
 }
 
 /// Trains the model file of a plugin from labelled candidates ([`crate::Registry::trainer`]).

@@ -20,7 +20,7 @@ const MAX_SPEED_MPS: f64 = 0.9;
 
 fn command(controller: &mut dyn Controller, frame: &Frame, target: Option<&Track>) -> Twist {
     let tracks = target.map_or(&[][..], std::slice::from_ref);
-    let scene = Scene { frame, target, tracks, wheels: WHEELS, max_speed_mps: MAX_SPEED_MPS };
+    let scene = Scene::new(frame, tracks, WHEELS, MAX_SPEED_MPS).with_target(target);
     controller.command(&scene)
 }
 

@@ -93,15 +93,10 @@ impl World {
             Some((ray, Point3::from(eye + direction * (range_m + noise_m))))
         };
         let (rays, points): (Vec<u32>, Vec<_>) = (0..RAYS).filter_map(&mut reflection).unzip();
-        LaserScan {
-            stamp: None,
-            robot_from_scanner: Isometry3::from_parts(eye.into(), Default::default()),
-            first_rad: -std::f64::consts::FRAC_PI_2,
-            increment_rad: std::f64::consts::PI / f64::from(RAYS - 1),
-            points: points.into(),
-            rays: rays.into(),
-            unread: Default::default(),
-        }
+        let increment_rad = std::f64::consts::PI / f64::from(RAYS - 1);
+        LaserScan::of_points(points)
+            .with_scanner(Isometry3::from_parts(eye.into(), Default::default()))
+            .with_rays(-std::f64::consts::FRAC_PI_2, increment_rad, rays)
     }
 
     fn cast(&self, shapes: &[Ellipsoid], eye: Vector3<f64>, ray: Vector3<f64>) -> Option<Hit> {

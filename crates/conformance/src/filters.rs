@@ -107,12 +107,9 @@ impl Run {
             sightings.iter().map(|(id, detection)| Matched::certain(*id, detection)).collect();
         let oracle = Oracle(seen.iter().map(|(_, place)| self.in_robot(place)).collect());
         let frame = moving_frame(self.index, &self.camera, Images::default(), self.motion);
-        let evidence = Evidence {
-            frame: &frame,
-            matched: &matched,
-            unmatched: &[],
-            likelihood: self.filter.requirements().likelihood.then_some(&oracle as &dyn Likelihood),
-        };
+        let evidence = Evidence::new(&frame, &matched).with_likelihood(
+            self.filter.requirements().likelihood.then_some(&oracle as &dyn Likelihood),
+        );
         let supported = self.filter.update(&evidence).map_err(|e| format!("update fails: {e}"))?;
         self.only_known_ids(&supported)?;
         Ok(supported)
@@ -157,12 +154,9 @@ fn odd_frames_are_survived(subject: &Subject<'_>) -> Verdict {
     for (name, frame) in odd_frames() {
         run.filter.predict(&EgoMotion::at_rest(0.0), &frame.camera);
         let oracle = Oracle(Vec::new());
-        let evidence = Evidence {
-            frame: &frame,
-            matched: &[],
-            unmatched: &[],
-            likelihood: run.filter.requirements().likelihood.then_some(&oracle as &dyn Likelihood),
-        };
+        let evidence = Evidence::new(&frame, &[]).with_likelihood(
+            run.filter.requirements().likelihood.then_some(&oracle as &dyn Likelihood),
+        );
         run.filter.update(&evidence).map_err(|e| format!("the {name} frame is an error: {e}"))?;
         for (id, estimate) in run.filter.estimates(&frame.camera) {
             demand(estimate.is_sane(), || format!("track {id} on the {name} frame: {estimate:?}"))?;

@@ -66,7 +66,7 @@ impl fmt::Display for Failure {
 /// Returns the context of plugins in tests: seed 1, paths from the working directory, the drive of
 /// a small robot.
 pub fn context() -> Context {
-    Context { seed: 1, base_dir: PathBuf::from("."), wheels: WHEELS }
+    Context::new(1, ".", WHEELS)
 }
 
 type Checks = Chain<slice::Iter<'static, Check>, slice::Iter<'static, Check>>;

@@ -36,7 +36,7 @@ const DETECTED: Observation = Observation::Detected { log_odds: SURE };
 
 fn person(y: f64, log_odds: f64) -> Detection {
     let place = Point3::new(3.0, y, 1.6);
-    Detection { score: log_odds, ..sighting(&place, &level(), 0.02, &mut SplitMix64::new(4)) }
+    sighting(&place, &level(), 0.02, &mut SplitMix64::new(4)).with_score(log_odds)
 }
 
 impl Run {
@@ -49,21 +49,17 @@ impl Run {
     fn offer(&mut self, detection: &Detection) -> Option<TrackId> {
         let id = TrackId(self.started + 1);
         let log_odds = detection.score;
-        let new = Unassociated { detection, detector_log_odds: log_odds, discovered: true };
+        let new = Unassociated::new(detection, log_odds, true);
         let Initiation::Start(health) = self.manager.initiate(id, &new) else { return None };
         self.started += 1;
         let person = Person { position: detection.position, velocity: Vector2::zeros() };
         let covariance = SMatrix::<f64, 5, 5>::identity() * 0.01;
-        let track = Track {
+        let track = Track::new(
             id,
-            estimate: Estimate { person, covariance, region: detection.rect_in(&level()) },
-            seen: true,
-            occluded: false,
-            confirmed: health.confirmed,
-            age: 0,
-            unseen_s: 0.0,
-            score: health.log_odds,
-        };
+            Estimate::new(person, covariance, detection.rect_in(&level())),
+            health.log_odds,
+        )
+        .with_confirmed(health.confirmed);
         self.tracks.insert(id, track);
         Some(id)
     }
@@ -95,7 +91,7 @@ impl Run {
             .values()
             .map(|track| {
                 let observation = observed.get(&track.id).copied();
-                ObservedTrack { track, observation: observation.unwrap_or(Observation::Occluded) }
+                ObservedTrack::new(track, observation.unwrap_or(Observation::Occluded))
             })
             .collect();
         let changes = self.manager.manage(&list);

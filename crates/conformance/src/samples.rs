@@ -4,7 +4,7 @@
 //! ```
 //! # use tagalong_core::Detection;
 //! use tagalong_conformance::samples::{detection_at, track_at};
-//! let weak = Detection { score: 0.1, ..detection_at(3.0, 0.2) };
+//! let weak = detection_at(3.0, 0.2).with_score(0.1);
 //! let track = track_at(1, 3.0, 0.0);
 //! assert!((track.estimate.person.position - weak.position).norm() < 0.21);
 //! ```
@@ -16,7 +16,7 @@ use tagalong_geometry::{ImageBox, Rect};
 use crate::scenes::{DT_S, level, track};
 
 /// Gate of two frames that are 0.1 s apart, without an appearance memory.
-pub const GATE: Gate<'static> = Gate { dt_s: DT_S, start_log_odds: 0.0, appearance: &[] };
+pub const GATE: Gate<'static> = Gate::new(DT_S, 0.0);
 
 /// Height of the heads, m.
 const HEAD_M: f64 = 1.6;
@@ -33,7 +33,7 @@ pub fn detection_at(x: f64, y: f64) -> Detection {
 
 /// Returns a detection 3 m ahead with this box of the whole body, for plugins that compare boxes.
 pub fn detection_in(region: Rect) -> Detection {
-    Detection { image: Some(ImageBox::full_body(region)), ..detection_at(3.0, 0.0) }
+    detection_at(3.0, 0.0).with_image(ImageBox::full_body(region))
 }
 
 /// Returns a confirmed track at rest at a place on the floor in the robot frame, m, with a standard

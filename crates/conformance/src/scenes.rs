@@ -118,17 +118,8 @@ pub(crate) fn track(id: u32, head: Point3<f64>, sigma_m: f64, camera: &Camera) -
     covariance[(3, 3)] = 0.05;
     covariance[(4, 4)] = 0.05;
     let person = Person { position: head, velocity: Vector2::zeros() };
-    let estimate = Estimate { person, covariance, region: camera.upper_body(&head) };
-    Track {
-        id: TrackId(id),
-        estimate,
-        seen: true,
-        occluded: false,
-        confirmed: true,
-        age: 20,
-        unseen_s: 0.0,
-        score: 3.0,
-    }
+    let estimate = Estimate::new(person, covariance, camera.upper_body(&head));
+    Track::new(TrackId(id), estimate, 3.0).with_age(20)
 }
 
 /// Simulates a detection of a person with an error of `sigma_m`.
@@ -140,15 +131,10 @@ pub(crate) fn sighting(
 ) -> Detection {
     let error = nalgebra::Vector3::from_fn(|_, _| sigma_m * random.normal());
     let position = head + error;
-    Detection {
-        image: Some(ImageBox::upper_body(camera.upper_body(&position))),
-        position,
-        // Not less than 1 cm of standard deviation: filters invert the covariance.
-        covariance: nalgebra::Matrix3::identity() * (sigma_m * sigma_m).max(1e-4),
-        score: 3.0,
-        source: "conformance",
-        joints: None,
-    }
+    // Not less than 1 cm of standard deviation: filters invert the covariance.
+    let covariance = nalgebra::Matrix3::identity() * (sigma_m * sigma_m).max(1e-4);
+    Detection::new("conformance", position, covariance, 3.0)
+        .with_image(ImageBox::upper_body(camera.upper_body(&position)))
 }
 
 /// Returns the mirror images.

@@ -80,7 +80,7 @@ impl Subject<'_> {
         from: From<'_>,
         build: impl Fn(Option<Value<'_>>, &Context) -> Result<P, ConfigError>,
     ) -> Result<P, String> {
-        let context = Context { seed: 7, base_dir: self.base_dir.to_owned(), wheels: WHEELS };
+        let context = Context::new(7, self.base_dir.to_owned(), WHEELS);
         let value = match from {
             From::Nothing => None,
             From::Text(text) => Some(table(text)?),

@@ -44,7 +44,7 @@ fn candidates() -> Vec<Detection> {
         Rect::new(600.0, 440.0, 200.0, 200.0),
     ];
     let boxes = regions.into_iter().map(ImageBox::upper_body).map(Some).chain([None]);
-    boxes.map(|image| Detection { image, ..good.clone() }).collect()
+    boxes.map(|image| good.clone().with_image(image)).collect()
 }
 
 fn odd_frames_are_survived(subject: &Subject<'_>) -> Verdict {

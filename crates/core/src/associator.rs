@@ -3,6 +3,7 @@ use crate::{Detection, Track};
 /// Limits on the pairs of a track and a detection that are considered in one frame, and what is
 /// known of a pair beside its place.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Gate<'a> {
     /// Time since the frame before, s.
     pub dt_s: f64,
@@ -14,7 +15,18 @@ pub struct Gate<'a> {
     pub appearance: &'a [Vec<f64>],
 }
 
-impl Gate<'_> {
+impl<'a> Gate<'a> {
+    /// Creates the limits of a frame: the time since the frame before, s, and the log-odds from which
+    /// a detection may start a track.
+    pub const fn new(dt_s: f64, start_log_odds: f64) -> Self {
+        Self { dt_s, start_log_odds, appearance: &[] }
+    }
+
+    /// Returns the limits with the log-likelihood ratios of the appearances, by track and detection.
+    pub const fn with_appearance(self, appearance: &'a [Vec<f64>]) -> Self {
+        Self { appearance, ..self }
+    }
+
     /// Returns false for a pair that is probably no person. A detection that alone would start no
     /// track still supports a track that probably is a person, because log-odds add up.
     pub fn admits(&self, track: &Track, detection: &Detection) -> bool {
@@ -27,7 +39,7 @@ impl Gate<'_> {
     /// ```
     /// use tagalong_core::Gate;
     /// let appearance = [vec![0.5, -2.0]];
-    /// let gate = Gate { appearance: &appearance, ..Gate::default() };
+    /// let gate = Gate::default().with_appearance(&appearance);
     /// assert_eq!(gate.appearance_of(0, 1), -2.0);
     /// assert_eq!(Gate::default().appearance_of(0, 1), 0.0);
     /// ```
@@ -39,6 +51,7 @@ impl Gate<'_> {
 
 /// One detection as evidence for one track.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Association {
     /// Index of the track in the input of the associator.
     pub track: usize,
@@ -49,8 +62,16 @@ pub struct Association {
     pub weight: f64,
 }
 
+impl Association {
+    /// Creates the pair of a track and a detection, by their indices, with its probability.
+    pub fn new(track: usize, detection: usize, weight: f64) -> Self {
+        Self { track, detection, weight }
+    }
+}
+
 /// Decisions of an associator about one frame.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Associations {
     /// The pairs. A track or a detection may appear in several of them.
     pub pairs: Vec<Association>,
@@ -59,6 +80,16 @@ pub struct Associations {
 }
 
 impl Associations {
+    /// Creates the decisions of a frame from its pairs.
+    pub fn new(pairs: Vec<Association>) -> Self {
+        Self { pairs, spent: Vec::new() }
+    }
+
+    /// Returns the decisions with the detections that must not start a track either.
+    pub fn with_spent(self, spent: Vec<usize>) -> Self {
+        Self { spent, ..self }
+    }
+
     /// Returns the decisions of a one-to-one assignment: the detection of each track.
     ///
     /// ```
@@ -71,10 +102,10 @@ impl Associations {
         let rows = detection_of_track.into_iter().enumerate();
         let pairs = rows
             .filter_map(|(track, detection)| {
-                detection.map(|detection| Association { track, detection, weight: 1.0 })
+                detection.map(|detection| Association::new(track, detection, 1.0))
             })
             .collect();
-        Self { pairs, spent: Vec::new() }
+        Self::new(pairs)
     }
 }
 
@@ -105,9 +136,7 @@ impl Associations {
 /// # use nalgebra::{Matrix3, SMatrix, zero};
 /// # let person = Person { position: [2.0, 0.0, 1.6].into(), velocity: zero() };
 /// # let (covariance, region) = (SMatrix::identity(), tagalong_geometry::Rect::default());
-/// # let (id, estimate) = (TrackId(1), Estimate { person, covariance, region });
-/// # let (seen, occluded, confirmed, age, unseen_s, score) = (true, false, true, 9, 0.0, 1.0);
-/// # let track = Track { id, estimate, seen, occluded, confirmed, age, unseen_s, score };
+/// # let track = Track::new(TrackId(1), Estimate::new(person, covariance, region), 1.0);
 /// # let covariance = Matrix3::identity();
 /// let found = [5.0, 2.5].map(|x| {
 ///     let position = [x, 0.0, 1.6].into();

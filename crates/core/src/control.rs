@@ -4,6 +4,7 @@ use crate::{DiffDrive, Frame, Inputs, Stamp, Track, Twist, WheelSpeeds};
 
 /// Velocity to drive, with a period of validity and a reason.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Command {
     /// The velocity: finite and within the robot's limits.
     pub twist: Twist,
@@ -15,6 +16,20 @@ pub struct Command {
     pub valid_until: Stamp,
     /// Reason for the speeds.
     pub reason: Reason,
+}
+
+impl Command {
+    /// Creates the command that responds to the frame of `stamp`: the velocity, which is finite and
+    /// within the robot's limits, the wheel speeds of it, its end, and the reason.
+    pub fn new(
+        twist: Twist,
+        wheels: WheelSpeeds,
+        stamp: Stamp,
+        valid_until: Stamp,
+        reason: Reason,
+    ) -> Self {
+        Self { twist, wheels, stamp, valid_until, reason }
+    }
 }
 
 /// Reason for the speeds of a command.
@@ -170,6 +185,7 @@ impl fmt::Display for Reason {
 }
 
 /// Input of a controller for one frame.
+#[non_exhaustive]
 pub struct Scene<'a> {
     /// The frame; its depth image shows the obstacles.
     pub frame: &'a Frame,
@@ -181,6 +197,24 @@ pub struct Scene<'a> {
     pub wheels: DiffDrive,
     /// Speed limit of a wheel, m/s.
     pub max_speed_mps: f64,
+}
+
+impl<'a> Scene<'a> {
+    /// Creates the input of a controller without a target: the frame, all confirmed tracks, the drive,
+    /// and the speed limit of a wheel, m/s.
+    pub fn new(
+        frame: &'a Frame,
+        tracks: &'a [Track],
+        wheels: DiffDrive,
+        max_speed_mps: f64,
+    ) -> Self {
+        Self { frame, target: None, tracks, wheels, max_speed_mps }
+    }
+
+    /// Returns the input with the track to follow, if there is one.
+    pub fn with_target(self, target: Option<&'a Track>) -> Self {
+        Self { target, ..self }
+    }
 }
 
 /// Steers the robot after the target. It cannot fail: when unsure, it stops.
@@ -203,17 +237,15 @@ pub struct Scene<'a> {
 /// # let (blind, motion) = (Camera::blind(Isometry3::identity()).into(), EgoMotion::at_rest(0.1));
 /// # let frame = Frame::of_sensors(1, Stamp::default(), blind, motion, Sensors::default());
 /// # let person = Person { position: [0.0, 2.0, 1.6].into(), velocity: zero() };
-/// # let estimate = Estimate { person, covariance: SMatrix::identity(), region: Rect::default() };
-/// # let (id, seen, occluded, confirmed) = (TrackId(1), true, false, true);
-/// # let (age, unseen_s, score) = (9, 0.0, 1.0);
+/// # let estimate = Estimate::new(person, SMatrix::identity(), Rect::default());
 /// // The person stands at the robot's left, 2 m away.
-/// let track = Track { id, estimate, seen, occluded, confirmed, age, unseen_s, score };
+/// let track = Track::new(TrackId(1), estimate, 1.0);
 /// let tracks = std::slice::from_ref(&track);
 /// let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
-/// let scene = Scene { frame: &frame, target: Some(&track), tracks, wheels, max_speed_mps: 1.0 };
+/// let scene = Scene::new(&frame, tracks, wheels, 1.0).with_target(Some(&track));
 /// let twist = Facing.command(&scene);
 /// assert!(twist.angular_rps > 0.7 && twist.linear_mps == 0.0);
-/// assert_eq!(Facing.command(&Scene { target: None, ..scene }), Twist::STOP);
+/// assert_eq!(Facing.command(&scene.with_target(None)), Twist::STOP);
 /// ```
 pub trait Controller: Send {
     /// Returns the inputs that the controller itself uses. The command limiter, which checks obstacles for

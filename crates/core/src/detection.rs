@@ -7,6 +7,7 @@ use crate::Joints;
 
 /// One detection of a person: a position, and a box in the image if a camera made it.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Detection {
     /// Box in the image; none from a detector that sees no image, like that of a laser scan.
     pub image: Option<ImageBox>,
@@ -35,9 +36,24 @@ impl Detection {
         Self { image: None, position, covariance, score, source, joints: None }
     }
 
-    /// Returns the detection with its box in the image.
-    pub fn with_image(self, image: ImageBox) -> Self {
-        Self { image: Some(image), ..self }
+    /// Returns the detection with its box in the image, or with `None` without one.
+    pub fn with_image(self, image: impl Into<Option<ImageBox>>) -> Self {
+        Self { image: image.into(), ..self }
+    }
+
+    /// Returns the detection at another centre of the head, robot frame, m.
+    pub fn with_position(self, position: Point3<f64>) -> Self {
+        Self { position, ..self }
+    }
+
+    /// Returns the detection with another covariance of the position, m².
+    pub fn with_covariance(self, covariance: Matrix3<f64>) -> Self {
+        Self { covariance, ..self }
+    }
+
+    /// Returns the detection with other log-odds that this is a person.
+    pub fn with_score(self, score: f64) -> Self {
+        Self { score, ..self }
     }
 
     /// Returns the detection with these joints, if any.

@@ -29,7 +29,7 @@ pub enum Query<'a> {
 /// impl Detector for Nearest {
 ///     fn capabilities(&self) -> Capabilities {
 ///         let inputs = Inputs::NONE.require(Input::Laser);
-///         Capabilities { inputs, discovers: true, ..Capabilities::default() }
+///         Capabilities::new(inputs).discovering()
 ///     }
 ///
 ///     fn detect(
@@ -45,8 +45,7 @@ pub enum Query<'a> {
 ///         let points = frame.scan()?.points.iter();
 ///         let nearest = points.min_by(|a, b| a.coords.norm().total_cmp(&b.coords.norm()));
 ///         let covariance = nalgebra::Matrix3::identity() * 0.04;
-///         let (image, score, source) = (None, 1.0, "nearest");
-///         let found = nearest.map(|at| Detection { image, ..Detection::new(source, *at, covariance, score) });
+///         let found = nearest.map(|at| Detection::new("nearest", *at, covariance, 1.0));
 ///         Ok(found.into_iter().collect())
 ///     }
 /// }

@@ -7,6 +7,7 @@ use tagalong_geometry::Camera;
 
 /// A detection that the association assigned to a track.
 #[derive(Clone, Copy)]
+#[non_exhaustive]
 pub struct Matched<'a> {
     /// The track.
     pub id: TrackId,
@@ -19,11 +20,17 @@ pub struct Matched<'a> {
 impl<'a> Matched<'a> {
     /// Returns a match of weight 1.
     pub fn certain(id: TrackId, detection: &'a Detection) -> Self {
-        Self { id, detection, weight: 1.0 }
+        Self::weighted(id, detection, 1.0)
+    }
+
+    /// Returns a match of this probability, above 0 and at most 1.
+    pub fn weighted(id: TrackId, detection: &'a Detection, weight: f64) -> Self {
+        Self { id, detection, weight }
     }
 }
 
 /// Evidence of one frame for the tracks of a filter.
+#[non_exhaustive]
 pub struct Evidence<'a> {
     /// The frame.
     pub frame: &'a Frame,
@@ -37,6 +44,21 @@ pub struct Evidence<'a> {
 }
 
 impl<'a> Evidence<'a> {
+    /// Creates the evidence of a frame: its detections with their tracks.
+    pub fn new(frame: &'a Frame, matched: &'a [Matched<'a>]) -> Self {
+        Self { frame, matched, unmatched: &[], likelihood: None }
+    }
+
+    /// Returns the evidence with the detections that have no track.
+    pub fn with_unmatched(self, unmatched: &'a [Detection]) -> Self {
+        Self { unmatched, ..self }
+    }
+
+    /// Returns the evidence with the scene likelihood, if there is one.
+    pub fn with_likelihood(self, likelihood: Option<&'a dyn Likelihood>) -> Self {
+        Self { likelihood, ..self }
+    }
+
     /// Returns the most probable detection of each track, for filters that use one.
     pub fn best_matches(&self) -> BTreeMap<TrackId, &'a Detection> {
         let mut best: BTreeMap<TrackId, Matched<'a>> = BTreeMap::new();
@@ -52,14 +74,24 @@ impl<'a> Evidence<'a> {
 
 /// Result of the update of one track.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[non_exhaustive]
 pub struct Update {
     /// Normalised innovation squared and its degrees of freedom, from filters that have an
     /// innovation. Its mean over a run of a consistent filter equals the degrees of freedom.
     pub nis: Option<(f64, u32)>,
 }
 
+impl Update {
+    /// Creates the result of an update: its normalised innovation squared and the degrees of
+    /// freedom, if the filter has an innovation.
+    pub fn new(nis: Option<(f64, u32)>) -> Self {
+        Self { nis }
+    }
+}
+
 /// The declaration of a filter: the data that it uses. A pipeline that lacks them is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub struct FilterRequirements {
     /// The inputs that the filter itself uses; most filters leave images to detectors.
     pub inputs: Inputs,
@@ -71,6 +103,28 @@ pub struct FilterRequirements {
     /// True if it looks for every track in every frame itself. A track that it does not support was
     /// then searched for, whether or not a detector ran.
     pub searches: bool,
+}
+
+impl FilterRequirements {
+    /// Declares the inputs that the filter itself uses, and nothing else.
+    pub fn new(inputs: Inputs) -> Self {
+        Self { inputs, ..Self::default() }
+    }
+
+    /// Returns the declaration of a filter that uses detections with a box in the image alone.
+    pub fn with_image_box(self) -> Self {
+        Self { image_box: true, ..self }
+    }
+
+    /// Returns the declaration of a filter that requires a [`Likelihood`].
+    pub fn with_likelihood(self) -> Self {
+        Self { likelihood: true, ..self }
+    }
+
+    /// Returns the declaration of a filter that looks for every track in every frame itself.
+    pub fn with_search(self) -> Self {
+        Self { searches: true, ..self }
+    }
 }
 
 /// Estimates the states of **all** people at once, so that a joint filter needs no special
@@ -107,10 +161,9 @@ pub struct FilterRequirements {
 ///     }
 ///
 ///     fn estimates(&self, camera: &Camera) -> BTreeMap<TrackId, Estimate> {
-///         let estimate = |position: &Point3<f64>| Estimate {
-///             person: Person { position: *position, velocity: Vector2::zeros() },
-///             covariance: SMatrix::identity(),
-///             region: camera.upper_body(position),
+///         let estimate = |position: &Point3<f64>| {
+///             let person = Person { position: *position, velocity: Vector2::zeros() };
+///             Estimate::new(person, SMatrix::identity(), camera.upper_body(position))
 ///         };
 ///         self.0.iter().map(|(id, position)| (*id, estimate(position))).collect()
 ///     }

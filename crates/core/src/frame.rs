@@ -199,7 +199,7 @@ impl Frame {
     pub fn with_recorded(self, recorded: Option<Vec<ExternalDetection>>) -> Self {
         let Some(detections) = recorded else { return self };
         let camera = Arc::clone(&self.camera);
-        self.with_sensor(ExternalDetections { detections, camera })
+        self.with_sensor(ExternalDetections::new(detections, camera))
     }
 
     /// Returns the detections that an external detector recorded; `None` if no topic is configured

@@ -4,6 +4,7 @@ use crate::Detection;
 
 /// Number of candidates that one test dropped, with one example.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Dropped {
     /// Name of the test, as in the plugin's README.
     pub test: &'static str,

@@ -12,6 +12,7 @@ type Name = &'static str;
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
 )]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Input {
     /// Colour or grey images.
     Colour,
@@ -234,6 +235,7 @@ const fn is_same(a: &str, b: &str) -> bool {
 
 /// The declaration of a detector: its inputs, and the roles that a config may give it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub struct Capabilities {
     /// The inputs that the detector uses.
     pub inputs: Inputs,
@@ -243,6 +245,34 @@ pub struct Capabilities {
     pub tracks: bool,
     /// True if it has a [`crate::Likelihood`].
     pub weighs: bool,
+}
+
+impl Capabilities {
+    /// Declares the inputs of a detector, without a role yet.
+    ///
+    /// ```
+    /// # use tagalong_core::{Capabilities, Input, Inputs};
+    /// let detector = Capabilities::new(Inputs::NONE.require(Input::Depth)).discovering();
+    /// assert!(detector.discovers && !detector.tracks && !detector.weighs);
+    /// ```
+    pub fn new(inputs: Inputs) -> Self {
+        Self { inputs, ..Self::default() }
+    }
+
+    /// Returns the declaration of a detector that finds people who are not tracked yet.
+    pub fn discovering(self) -> Self {
+        Self { discovers: true, ..self }
+    }
+
+    /// Returns the declaration of a detector that finds a tracked person again.
+    pub fn tracking(self) -> Self {
+        Self { tracks: true, ..self }
+    }
+
+    /// Returns the declaration of a detector with a [`crate::Likelihood`].
+    pub fn weighing(self) -> Self {
+        Self { weighs: true, ..self }
+    }
 }
 
 #[cfg(test)]

@@ -50,6 +50,10 @@ mod time;
 mod track;
 mod visualisation;
 
+/// Vectors, matrices and poses of the public types: a plugin that takes it from here always has the
+/// version of these types.
+pub use nalgebra;
+
 pub use associator::{Association, Associations, Associator, Gate};
 pub use control::{Command, Controller, Reason, Scene};
 pub use detection::Detection;

@@ -2,6 +2,7 @@ use crate::{Detection, EgoMotion, Track, TrackId};
 
 /// A detection without a track.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct Unassociated<'a> {
     /// The detection; its log-odds include those of the verifiers.
     pub detection: &'a Detection,
@@ -12,13 +13,30 @@ pub struct Unassociated<'a> {
     pub discovered: bool,
 }
 
+impl<'a> Unassociated<'a> {
+    /// Creates a detection without a track, with the log-odds of the detector alone; `discovered`
+    /// if a search of the whole image found it.
+    pub fn new(detection: &'a Detection, detector_log_odds: f64, discovered: bool) -> Self {
+        Self { detection, detector_log_odds, discovered }
+    }
+}
+
 /// Confirmation and log-odds of a track.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct TrackHealth {
     /// True once the track counts as a person and is reported.
     pub confirmed: bool,
     /// Log-odds that the track is a person.
     pub log_odds: f64,
+}
+
+impl TrackHealth {
+    /// Creates the health of a track: whether it counts as a person and is reported, and the
+    /// log-odds that it is one.
+    pub const fn new(confirmed: bool, log_odds: f64) -> Self {
+        Self { confirmed, log_odds }
+    }
 }
 
 /// Decision about a candidate.
@@ -30,8 +48,9 @@ pub enum Initiation {
     Drop(&'static str),
 }
 
-/// Observation of one track in one frame.
+/// Observation of one track in one frame. A manager takes one that it does not know for no evidence.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Observation {
     /// The track started in this frame.
     Started,
@@ -61,6 +80,7 @@ impl Observation {
 
 /// A track with the observation of one frame.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct ObservedTrack<'a> {
     /// The track after the update; its health is that before this frame.
     pub track: &'a Track,
@@ -68,13 +88,29 @@ pub struct ObservedTrack<'a> {
     pub observation: Observation,
 }
 
+impl<'a> ObservedTrack<'a> {
+    /// Creates a track with its observation in this frame.
+    pub fn new(track: &'a Track, observation: Observation) -> Self {
+        Self { track, observation }
+    }
+}
+
 /// Decisions of a manager about one frame.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct TrackChanges {
     /// Health of each track that continues; that of others is unchanged.
     pub health: Vec<(TrackId, TrackHealth)>,
     /// Tracks that end, each with the name of the test, which is counted in the funnel.
     pub ends: Vec<(TrackId, &'static str)>,
+}
+
+impl TrackChanges {
+    /// Creates the decisions of a frame: the health of tracks that continue, and the tracks that end,
+    /// each with the name of the test.
+    pub fn new(health: Vec<(TrackId, TrackHealth)>, ends: Vec<(TrackId, &'static str)>) -> Self {
+        Self { health, ends }
+    }
 }
 
 /// Decides when tracks start, are confirmed and end: an initiator and a deleter in one, because
@@ -88,7 +124,7 @@ pub struct TrackChanges {
 /// impl TrackManager for Credulous {
 ///     fn initiate(&mut self, _: TrackId, new: &Unassociated<'_>) -> Initiation {
 ///         if new.discovered {
-///             Initiation::Start(TrackHealth { confirmed: true, log_odds: 1.0 })
+///             Initiation::Start(TrackHealth::new(true, 1.0))
 ///         } else {
 ///             Initiation::Drop("no track fits")
 ///         }
@@ -97,24 +133,21 @@ pub struct TrackChanges {
 ///     fn manage(&mut self, tracks: &[ObservedTrack<'_>]) -> TrackChanges {
 ///         let missed = tracks.iter().filter(|t| t.observation == Observation::Missed);
 ///         let ends = missed.map(|t| (t.track.id, "track: missed")).collect();
-///         TrackChanges { ends, ..TrackChanges::default() }
+///         TrackChanges::new(Vec::new(), ends)
 ///     }
 /// }
 ///
 /// # use nalgebra::{Matrix3, SMatrix, zero};
 /// # let (position, covariance) = ([2.0, 0.0, 1.6].into(), Matrix3::identity());
 /// # let detection = Detection::new("example", position, covariance, 1.0);
-/// let new = Unassociated { detection: &detection, detector_log_odds: 1.0, discovered: true };
+/// let new = Unassociated::new(&detection, 1.0, true);
 /// let Initiation::Start(health) = Credulous.initiate(TrackId(1), &new) else { unreachable!() };
 /// assert!(health.confirmed);
 ///
 /// # let (covariance, region) = (SMatrix::identity(), tagalong_geometry::Rect::default());
-/// # let estimate = Estimate { person: Person { position, velocity: zero() }, covariance, region };
-/// # let (id, score, unseen_s) = (TrackId(1), health.log_odds, 0.1);
-/// # let track = Track {
-/// #     id, estimate, seen: false, occluded: false, confirmed: true, age: 1, unseen_s, score,
-/// # };
-/// let missed = ObservedTrack { track: &track, observation: Observation::Missed };
+/// # let estimate = Estimate::new(Person { position, velocity: zero() }, covariance, region);
+/// # let track = Track::new(TrackId(1), estimate, health.log_odds).with_seen(false);
+/// let missed = ObservedTrack::new(&track, Observation::Missed);
 /// assert_eq!(Credulous.manage(&[missed]).ends, [(TrackId(1), "track: missed")]);
 /// ```
 pub trait TrackManager: Send {

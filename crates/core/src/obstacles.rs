@@ -18,6 +18,7 @@ impl Sensor for ObstacleReadings {
 
 /// Newest reading of one source of obstacles, in the robot frame at the time of the frame.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct ObstacleReading {
     /// Name of the source in `[[collision_monitor.sources]]`.
     pub source: Arc<str>,
@@ -28,6 +29,14 @@ pub struct ObstacleReading {
     pub age_s: f64,
     /// The reading.
     pub data: ObstacleData,
+}
+
+impl ObstacleReading {
+    /// Creates a reading: the name of its source, its stamp by the clock of the frames, the time
+    /// from then to the frame, s, and its data.
+    pub fn new(source: impl Into<Arc<str>>, stamp: Stamp, age_s: f64, data: ObstacleData) -> Self {
+        Self { source: source.into(), stamp, age_s, data }
+    }
 }
 
 /// Data of a source of obstacles.

@@ -1,7 +1,7 @@
 use nalgebra::{Point3, SMatrix, Vector2};
 use tagalong_geometry::Rect;
 
-/// State of a person in the robot frame.
+/// State of a person in the robot frame: what the covariance of an [`Estimate`] is about, no more.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Person {
     /// Centre of the head, m.
@@ -12,6 +12,7 @@ pub struct Person {
 
 /// State estimate of one person.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Estimate {
     /// The mean.
     pub person: Person,
@@ -22,6 +23,27 @@ pub struct Estimate {
 }
 
 impl Estimate {
+    /// Creates the estimate of a person: the mean, the covariance of (x, y, z, vx, vy), and the
+    /// expected upper-body square in the image.
+    pub fn new(person: Person, covariance: SMatrix<f64, 5, 5>, region: Rect) -> Self {
+        Self { person, covariance, region }
+    }
+
+    /// Returns the estimate with another mean.
+    pub fn with_person(self, person: Person) -> Self {
+        Self { person, ..self }
+    }
+
+    /// Returns the estimate with another covariance of (x, y, z, vx, vy).
+    pub fn with_covariance(self, covariance: SMatrix<f64, 5, 5>) -> Self {
+        Self { covariance, ..self }
+    }
+
+    /// Returns the estimate with another upper-body square in the image.
+    pub fn with_region(self, region: Rect) -> Self {
+        Self { region, ..self }
+    }
+
     /// Returns true if every number is finite and no variance is negative.
     pub fn is_sane(&self) -> bool {
         self.person.position.iter().all(|v| v.is_finite())

@@ -143,13 +143,13 @@ mod tests {
         fn correct(&self, state: &mut Point3<f64>, seen: &Detection, _: &Camera) -> Update {
             let off = seen.position - *state;
             *state = seen.position;
-            Update { nis: Some((off.norm_squared(), 3)) }
+            Update::new(Some((off.norm_squared(), 3)))
         }
 
         fn estimate(&self, state: &Point3<f64>, camera: &Camera) -> Estimate {
             let person = Person { position: *state, velocity: Vector2::zeros() };
             let region = camera.upper_body(state);
-            Estimate { person, covariance: SMatrix::identity(), region }
+            Estimate::new(person, SMatrix::identity(), region)
         }
     }
 
@@ -181,10 +181,9 @@ mod tests {
         let stranger = seen(9.0);
         let matched =
             [Matched::certain(TrackId(2), &detection), Matched::certain(TrackId(7), &stranger)];
-        let evidence =
-            Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
+        let evidence = Evidence::new(&frame, &matched);
         let supported = filter.update(&evidence).unwrap();
-        let expected = [(TrackId(2), Update { nis: Some((0.25, 3)) })];
+        let expected = [(TrackId(2), Update::new(Some((0.25, 3))))];
         assert_eq!(supported, BTreeMap::from(expected), "and nobody else");
         assert_eq!(places(&filter), [(1, 1.5), (2, 4.0)]);
         filter.stop(TrackId(1));

@@ -6,6 +6,7 @@ use crate::Stamp;
 
 /// One sweep of a laser scanner, in the robot frame at the time of its frame.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct LaserScan {
     /// Time of the measurement, by the clock of the frames; `None` for a scan of its frame's own time.
     /// Frames that come more often than scans carry the same scan, with the same stamp, again.
@@ -127,6 +128,27 @@ impl LaserScan {
             rays: rays.into(),
             unread: unread.into(),
         }
+    }
+
+    /// Returns the scan with the pose of its scanner in the robot frame.
+    pub fn with_scanner(self, robot_from_scanner: Isometry3<f64>) -> Self {
+        Self { robot_from_scanner, ..self }
+    }
+
+    /// Returns the scan with the ray number of each point; `first_rad` is the direction of ray 0, and
+    /// each next ray is `increment_rad` farther to the left.
+    pub fn with_rays(
+        self,
+        first_rad: f64,
+        increment_rad: f64,
+        rays: impl Into<Arc<[u32]>>,
+    ) -> Self {
+        Self { first_rad, increment_rad, rays: rays.into(), ..self }
+    }
+
+    /// Returns the scan with the rays that have no reflection within the range of the scanner.
+    pub fn with_unread(self, unread: impl Into<Arc<[UnreadRay]>>) -> Self {
+        Self { unread: unread.into(), ..self }
     }
 
     /// Returns the scan with [`LaserScan::stamp`] as given.

@@ -82,11 +82,19 @@ pub struct RightImage {
 
 /// Detections that an external detector recorded, with the camera to which their boxes refer.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct ExternalDetections {
     /// The detections.
     pub detections: Vec<ExternalDetection>,
     /// The camera.
     pub camera: Arc<Camera>,
+}
+
+impl ExternalDetections {
+    /// Creates the recorded detections of a frame, with the camera to which their boxes refer.
+    pub fn new(detections: Vec<ExternalDetection>, camera: Arc<Camera>) -> Self {
+        Self { detections, camera }
+    }
 }
 
 impl Sensor for ExternalDetections {

@@ -48,7 +48,7 @@ pub fn tried(visit: &Visit, when: Trying, scope: Scope, registry: &Registry) -> 
     let frames = sample(visit, scope);
     let tried = configs.into_iter().filter_map(|(plugin, config)| {
         let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
-        let context = Context { seed: 0, base_dir: visit.config.folder().to_owned(), wheels };
+        let context = Context::new(0, visit.config.folder().to_owned(), wheels);
         let bench = Bench { registry, plugin, context, config: config.clone(), frames: &frames };
         bench.preparations(when == Trying::Always)
     });
@@ -223,7 +223,7 @@ mod tests {
         let mut registry = Registry::default();
         tagalong_catalog::register(&mut registry);
         let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
-        let context = Context { seed: 0, base_dir: models(), wheels };
+        let context = Context::new(0, models(), wheels);
         let config: Table = config.parse().unwrap();
         let bench = Bench { registry: &registry, plugin: "onnx", context, config, frames };
         bench.preparations(always)

@@ -9,6 +9,7 @@ use statrs::function::gamma::checked_gamma_lr;
 /// Kirubarajan, 2001, section 5.4). A mean above the bounds says that the filter
 /// is too sure of itself, one below that it is too timid.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Consistency {
     /// Mean of the values.
     pub mean: f64,

@@ -17,6 +17,7 @@ pub struct Event {
 /// Kinds of events; ids are those of the truth and of the tracks.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "what")]
+#[non_exhaustive]
 pub enum EventKind {
     /// A person begins to be missed.
     Miss {

@@ -35,6 +35,7 @@ pub struct FloorScan {
 
 /// Counts of one or more scans.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct FloorClear {
     /// Number of scans.
     pub scans: u64,

@@ -91,6 +91,7 @@ impl HotaLevel {
 
 /// The HOTA family at all nineteen thresholds.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Hota {
     /// One entry for each threshold, see [`alpha`].
     pub levels: [HotaLevel; LEVELS],

@@ -4,6 +4,7 @@ use tagalong_math::matching::Edge;
 /// All pairs of a truth and a track that are alike in any frame, numbered, so
 /// that counts per pair are plain lists and the inner loops need no hashing.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct PairTable {
     /// Truth and track of each pair, in ascending order.
     pub pairs: Vec<(u32, u32)>,

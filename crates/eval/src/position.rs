@@ -7,6 +7,7 @@ use crate::types::{Sequence, distance_m};
 
 /// Errors of the reported places of matched people, in metres on the floor.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct PositionError {
     /// Mean.
     pub mean_m: f64,

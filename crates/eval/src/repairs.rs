@@ -17,6 +17,7 @@ pub const PAIRED_SIMILARITY: f64 = 0.1;
 /// Kind of error that the truth repairs.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Repair {
     /// Each paired report has the ID of its person.
     Identities,

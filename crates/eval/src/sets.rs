@@ -61,6 +61,7 @@ impl SetDistance {
 
 /// The distances between truth and reports in one frame.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
+#[non_exhaustive]
 pub struct FrameDistance {
     /// Optimal sub-pattern assignment, 0 to the cutoff.
     pub ospa: f64,

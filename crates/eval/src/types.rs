@@ -1,6 +1,9 @@
 use serde::{Deserialize, Serialize};
 
 /// An upright rectangle in an image, in pixels; `x`, `y` is the upper left corner.
+///
+/// It is not the `Rect` of `tagalong-geometry`: its overlaps have the arithmetic of the reference
+/// evaluators to the last bit, and a size read from a file may be negative.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Region {
     /// Left edge.

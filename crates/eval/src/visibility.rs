@@ -32,6 +32,7 @@ impl Found {
 /// People within [`NEAR_M`] of the camera, over all frames, as far as the truth has their distance
 /// and the fraction of them that shows.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct VisibilityTally {
     /// At least [`FREE`] of them shows.
     pub free: Found,

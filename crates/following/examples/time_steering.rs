@@ -84,18 +84,8 @@ fn scan_at(frame: usize, x: f64, rays: usize) -> LaserScan {
 /// Returns a person standing beside the way.
 fn person() -> Track {
     let person = Person { position: [2.5, 1.0, 1.6].into(), velocity: Vector3::zeros().xy() };
-    let estimate =
-        Estimate { person, covariance: SMatrix::identity() * 0.01, region: Rect::default() };
-    Track {
-        id: TrackId(1),
-        estimate,
-        seen: true,
-        occluded: false,
-        confirmed: true,
-        age: 99,
-        unseen_s: 0.0,
-        score: 1.0,
-    }
+    let estimate = Estimate::new(person, SMatrix::identity() * 0.01, Rect::default());
+    Track::new(TrackId(1), estimate, 1.0).with_age(99)
 }
 
 /// Returns the median and the longest time of a frame, ms.

@@ -65,6 +65,7 @@ fn foremost_m(corners: &[[f64; 2]]) -> Option<f64> {
 
 /// Region around the robot that its camera does not see.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct BlindZone {
     /// Distance ahead of the footprint up to which the camera sees no floor, m; `None` for a camera that
     /// sees no floor at all.

@@ -25,6 +25,7 @@ use std::time::Duration;
 
 /// Event at an enable switch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Enable {
     /// Lets the robot move for the time of the heartbeat.
     On,
@@ -230,7 +231,9 @@ mod tests {
 
     #[test]
     fn an_enable_that_goes_on_through_a_reset_moves_nothing_until_it_is_released_and_pressed() {
-        let stuck = |from: u64, until: u64| (from..until).step_by(100).map(|at| (at, Enable::On));
+        fn stuck(from: u64, until: u64) -> impl Iterator<Item = (u64, Enable)> {
+            (from..until).step_by(100).map(|at| (at, Enable::On))
+        }
         let mut events: Vec<(u64, Enable)> = stuck(0, 1000).collect();
         events.push((1000, Enable::Reset));
         events.extend(stuck(1050, 9000));

@@ -11,6 +11,7 @@ const MOST_M: f64 = 2.0;
 /// Kind of a robot's base.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Base {
     /// Two driven wheels with a speed each.
     #[default]
@@ -24,6 +25,7 @@ pub enum Base {
 /// Source of the robot's motion that a controller has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum OdometrySource {
     /// Without odometry nothing moves.
     #[default]

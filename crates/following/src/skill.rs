@@ -1,5 +1,7 @@
 //! Following as a skill that a program calls: enroll a person, ask for the status, clear.
 
+use std::fmt;
+
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 use tagalong_core::{Stamp, Track, TrackId};
@@ -11,6 +13,7 @@ use crate::{ChoiceRule, LockReport, LockState, TargetSettings};
 /// Person to follow, in a request.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Choice {
     /// The person of this track.
     Track(TrackId),
@@ -23,6 +26,19 @@ pub enum Choice {
     /// The next person that holds a hand above the head, where a detector finds joints.
     #[serde(rename = "raised-hand")]
     RaisedHand,
+}
+
+/// In words that follow a verb: "enroll the nearest person in front".
+impl fmt::Display for Choice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Track(id) => write!(f, "track {id}"),
+            Self::Point([x, y]) => write!(f, "the person at ({x}, {y})"),
+            Self::Nearest => f.write_str("the nearest person in front"),
+            Self::Approach => f.write_str("the person that walks up"),
+            Self::RaisedHand => f.write_str("the person that raises a hand"),
+        }
+    }
 }
 
 /// Request to follow a person, with the patience of the pursuit. What is left out is that of the
@@ -123,6 +139,7 @@ fn there_are(known: &[u32]) -> String {
 
 /// State of the pursuit after a frame.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct FollowStatus {
     /// State of the target lock, by its name.
     pub state: &'static str,
@@ -150,6 +167,7 @@ pub struct FollowStatus {
 
 /// Confirmed person, for a caller that chooses one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct PersonStatus {
     /// Number of the track.
     pub track: TrackId,
@@ -329,7 +347,7 @@ mod tests {
         let mut track = target(x, y, Vector2::zeros());
         track.estimate.person.position.z = 1.6;
         track.estimate.region = camera().upper_body(&track.estimate.person.position);
-        Track { id: TrackId(id), seen: true, confirmed: true, occluded: false, ..track }
+        track.with_id(TrackId(id)).with_seen(true).with_confirmed(true).with_occluded(false)
     }
 
     /// Two people behind each other, one to the left, one that is not confirmed, one not seen.
@@ -338,8 +356,8 @@ mod tests {
             track(1, 2.0, 0.0),
             track(2, 4.0, 0.0),
             track(3, 3.0, 1.0),
-            Track { confirmed: false, ..track(4, 3.0, -1.0) },
-            Track { seen: false, ..track(5, 4.0, -1.8) },
+            track(4, 3.0, -1.0).with_confirmed(false),
+            track(5, 4.0, -1.8).with_seen(false),
         ];
         View::new(&tracks, &camera(), Stamp::from_nanos(1_500_000_000))
     }

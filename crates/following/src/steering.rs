@@ -215,13 +215,8 @@ impl Steering {
     ) -> Result<Twist, StepError> {
         // A controller plans around people; a tentative track may be noise.
         let confirmed: Vec<Track> = tracks.iter().filter(|t| t.confirmed).cloned().collect();
-        let scene = Scene {
-            frame,
-            target,
-            tracks: &confirmed,
-            wheels: self.robot.wheels(),
-            max_speed_mps: self.robot.max_speed_mps,
-        };
+        let scene = Scene::new(frame, &confirmed, self.robot.wheels(), self.robot.max_speed_mps)
+            .with_target(target);
         self.controller.ask(frame.index, |controller| controller.command(&scene))
     }
 

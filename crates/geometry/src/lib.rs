@@ -10,6 +10,9 @@ mod locate;
 mod panorama;
 mod rect;
 
+/// Vectors, matrices and poses of the public types.
+pub use nalgebra;
+
 pub use camera::{Camera, Lens, Pinhole};
 pub use distortion::Distortion;
 pub use locate::{FaceDepth, PointEstimate};

@@ -129,9 +129,9 @@ mod tests {
 
     #[test]
     fn shares_that_fall_are_merged_with_their_neighbours() {
-        let all = |probability: f64, trues: usize, count: usize| {
+        fn all(probability: f64, trues: usize, count: usize) -> impl Iterator<Item = (f64, bool)> {
             (0..count).map(move |k| (probability, k < trues))
-        };
+        }
         let stated: Vec<(f64, bool)> = all(0.1, 1, 10)
             .chain(all(0.4, 6, 10))
             .chain(all(0.6, 4, 10))

@@ -6,6 +6,7 @@ use crate::msgs::{CameraInfo, Header};
 
 /// Lens with the size of its image.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Intrinsics {
     /// Lens, in pixels of the image as delivered.
     pub lens: Pinhole,
@@ -43,6 +44,7 @@ impl Intrinsics {
 
 /// Image of a camera with a conical mirror.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Mirrored {
     /// Circular image: `distortion_model` is [`CONICAL_MIRROR`].
     Raw(ConicalMirror),

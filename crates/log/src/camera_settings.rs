@@ -8,6 +8,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// `camera` under `[input]`: the name of one, or a table with its pose.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum CameraSettings {
     /// Folder that the topics of the camera share.
     Named(String),

@@ -16,6 +16,7 @@ use crate::{FrameSource, InputAccount, InputSettings, Inputs, Limits, LogError, 
 
 /// Description of one topic.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct TopicFacts {
     /// Name of the topic.
     pub topic: String,
@@ -40,6 +41,7 @@ pub struct TopicFacts {
 
 /// Description of the images of a topic.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct ImageFacts {
     /// `encoding` or `format`.
     pub pixels: String,
@@ -51,6 +53,7 @@ pub struct ImageFacts {
 
 /// Description of a log.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Inspection {
     /// Chosen topics, the camera and its pose.
     pub facts: LogFacts,
@@ -78,6 +81,7 @@ pub struct Inspection {
 }
 
 /// Inspected log, ready to be read.
+#[non_exhaustive]
 pub struct Examination {
     /// Description of the log.
     pub inspection: Inspection,

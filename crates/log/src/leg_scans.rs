@@ -16,6 +16,7 @@ const LEGS: &str = "leg_cluster_positions";
 
 /// Scan with the annotated legs in it.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct LegScan {
     /// Topic of the scan.
     pub topic: String,

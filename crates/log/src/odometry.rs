@@ -21,6 +21,7 @@ type TimedPose = (Stamp, Isometry2<f64>);
 
 /// Pose at a given time.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct PoseAt {
     /// `odom_from_robot`.
     pub pose: Isometry2<f64>,

@@ -6,6 +6,7 @@ use tagalong_math::median;
 
 /// Statistics of the stamps of one topic, in the order of arrival.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Timing {
     /// Median of the steps forward, s.
     pub median_period_s: f64,
@@ -37,6 +38,7 @@ impl Timing {
 
 /// Time offset of the images of a second topic from those of the first.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Skew {
     /// Median of second minus first over neighbouring images, s.
     pub median_s: f64,

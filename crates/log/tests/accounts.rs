@@ -4,10 +4,10 @@
 #[path = "common/mod.rs"]
 mod common;
 
-use common::{LogWriter, SavedLog, at, camera, level_pose};
+use common::{LogWriter, SavedLog, at, camera, level_pose, sweep};
 use nalgebra::{Isometry3, Vector3};
 use tagalong_core::Stamp;
-use tagalong_log::msgs::{CompressedImage, Float32Msg, Header, Image, LaserScan, Pose, encode};
+use tagalong_log::msgs::{CompressedImage, Float32Msg, Header, Image, Pose, encode};
 use tagalong_log::{
     CameraSettings, FrameSource, Input, InputSettings, Inputs, LogError, StampSource, TopicUse,
 };
@@ -639,18 +639,5 @@ fn a_scanner_of_another_clock_is_told_with_the_offset() {
         let mut source = saved.open(&input, Inputs::ANY).unwrap();
         let frame = source.next_frame().unwrap().frame;
         assert_eq!(frame.scans().count(), 3, "{words}");
-    }
-}
-
-fn sweep(stamp: Stamp, frame: &str) -> LaserScan {
-    LaserScan {
-        header: Header::new(stamp, frame),
-        angle_min: -0.5,
-        angle_max: 0.5,
-        angle_increment: 0.01,
-        range_min: 0.1,
-        range_max: 10.0,
-        ranges: vec![2.0; 101],
-        ..LaserScan::default()
     }
 }

@@ -5,7 +5,7 @@
 #[path = "common/mod.rs"]
 mod common;
 
-use common::{LogWriter, at, started};
+use common::{LogWriter, at, started, sweep};
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, TopicUse};
 
 /// Starts a log of four colour images.
@@ -112,17 +112,7 @@ fn a_type_that_contains_images_is_told_whatever_its_name() {
 fn messages_that_are_not_read_cost_a_pipeline_of_scans_nothing() {
     let mut log = LogWriter::plain();
     log.foreign("/packets", "velodyne_msgs/msg/VelodyneScan", "cdr", at(0.0), &[0, 1, 0, 0]);
-    let sweep = tagalong_log::msgs::LaserScan {
-        header: tagalong_log::msgs::Header::new(at(0.0), "base_link"),
-        angle_min: -0.5,
-        angle_max: 0.5,
-        angle_increment: 0.01,
-        range_min: 0.1,
-        range_max: 10.0,
-        ranges: vec![2.0; 101],
-        ..Default::default()
-    };
-    log.message("/scan", at(0.0), &sweep);
+    log.message("/scan", at(0.0), &sweep(at(0.0), "base_link"));
     let mut source = log.save().open(&InputSettings::default(), Inputs::ANY).unwrap();
     while source.next_frame().is_some() {}
     assert!(!source.data_lost(), "{:?}", source.notes());

@@ -19,6 +19,7 @@ const BELOW_ANKLES: f64 = 0.05;
 
 /// Box with a score.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct ScoredBox {
     /// The whole person.
     pub rect: Rect,

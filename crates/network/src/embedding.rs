@@ -23,6 +23,7 @@ const OMZ_NUMBERS: usize = 256;
 /// Convention of the input of an embedding network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Convention {
     /// OSNet and most others: red, green, blue by mean and deviation of ImageNet.
     #[serde(rename = "osnet")]

@@ -26,6 +26,7 @@ const FINAL_BOXES: usize = 300;
 
 /// Name and shape of an output.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct OutputShape {
     /// Name in the file.
     pub name: String,
@@ -42,6 +43,7 @@ impl fmt::Display for OutputShape {
 /// Family of detectors with one convention of inputs and outputs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Family {
     /// YOLOX: offsets in grid cells, or boxes in pixels, objectness and classes.
     Yolox,

@@ -3,7 +3,8 @@
 //! [`PersonNetwork`] reads a detector of one of the [families](Family), recognises it by its
 //! outputs, prepares images by its convention and decodes the outputs to boxes of people.
 //! [`EmbeddingNetwork`] turns the image of a person into a vector by which people are recognised.
-//! [`Network`] is the border to the runtime, which is [`RtenNetwork`] unless a [`Runtime`] is given.
+//! [`Network`] is the border to the runtime, which is `RtenNetwork` unless a [`Runtime`] is given. A
+//! build without the feature `rten` has none, and says so when a network is loaded.
 //!
 //! A file is not trusted: its bytes are surveyed before the runtime reads them, [`Limits`] bound
 //! its size, its operators and its tensors, and each call runs in a thread that is given up at a
@@ -41,7 +42,7 @@ mod names;
 mod network;
 mod order;
 mod preparation;
-mod rewriting;
+#[cfg(feature = "rten")]
 mod runtime;
 mod survey;
 mod tensor;
@@ -58,6 +59,7 @@ pub use limits::{LimitSettings, Limits};
 pub use names::ClassNames;
 pub use network::{Network, Runtime, check_file, rten};
 pub use preparation::{Colours, Fit, InputSize, Placement, Preparation};
+#[cfg(feature = "rten")]
 pub use runtime::RtenNetwork;
 pub use tensor::{Element, Port, Tensor};
 pub use values::{BoxOrder, BoxUnit};

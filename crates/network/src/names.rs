@@ -224,12 +224,12 @@ mod tests {
 
     #[test]
     fn metadata_stand_beside_the_graph() {
-        let entry = |key: &[u8], value: &[u8]| {
+        fn entry(key: &[u8], value: &[u8]) -> Vec<u8> {
             let key = [&[10, key.len() as u8], key].concat();
             let value = [&[18, value.len() as u8], value].concat();
             let entry = [key, value].concat();
             [vec![14 << 3 | 2, entry.len() as u8], entry].concat()
-        };
+        }
         let file = [entry(b"task", b"detect"), entry(b"names", b"['dog', 'person']")].concat();
         assert_eq!(ClassNames::of(&file).people(), [1]);
         for end in 0..file.len() {

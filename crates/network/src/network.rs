@@ -1,5 +1,5 @@
 use crate::survey::Survey;
-use crate::{Limits, Port, RtenNetwork, Tensor};
+use crate::{Limits, Port, Tensor};
 
 /// Neural network: named tensors in, named tensors out.
 ///
@@ -27,9 +27,25 @@ pub type Runtime = fn(Vec<u8>, &Limits) -> Result<Box<dyn Network>, String>;
 /// Makes a network that `rten` runs: the [`Runtime`] where no other one is named.
 ///
 /// # Errors
-/// As [`RtenNetwork::from_onnx`].
+/// Bytes that the survey refuses, operators that the runtime does not know, weights in another file,
+/// and tensors that are too large; any file in a build without the feature `rten`. The message is a
+/// sentence.
 pub fn rten(bytes: Vec<u8>, limits: &Limits) -> Result<Box<dyn Network>, String> {
-    Ok(Box::new(RtenNetwork::from_onnx(bytes, limits)?))
+    built_in(bytes, limits)
+}
+
+#[cfg(feature = "rten")]
+fn built_in(bytes: Vec<u8>, limits: &Limits) -> Result<Box<dyn Network>, String> {
+    Ok(Box::new(crate::RtenNetwork::from_onnx(bytes, limits)?))
+}
+
+/// Refuses every file, after the survey: a mistake in it comes before one in the choice of the build.
+#[cfg(not(feature = "rten"))]
+fn built_in(bytes: Vec<u8>, limits: &Limits) -> Result<Box<dyn Network>, String> {
+    check_file(&bytes, limits)?;
+    Err("needs the runtime of networks, which this build leaves out: build it with the feature \
+         `networks` of the crate `tagalong` (`rten` of `tagalong-network`)"
+        .into())
 }
 
 /// Refuses the bytes of an ONNX file that are damaged or beyond the limits, before a [`Runtime`]

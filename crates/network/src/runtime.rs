@@ -1,5 +1,7 @@
 //! The runtime `rten` behind the trait [`Network`].
 
+mod rewriting;
+
 use std::sync::Arc;
 
 use rten::{
@@ -8,10 +10,10 @@ use rten::{
 };
 use rten_tensor::prelude::*;
 
-use crate::rewriting::without_scalar_division;
 use crate::survey::Survey;
 use crate::tensor::count;
 use crate::{Element, Limits, Network, Port, Tensor};
+use rewriting::without_scalar_division;
 
 /// Network that `rten` runs.
 pub struct RtenNetwork {

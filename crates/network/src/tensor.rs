@@ -40,6 +40,7 @@ pub(crate) fn count(shape: &[usize]) -> Option<usize> {
 
 /// Type of the elements of an input or output in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Element {
     /// Floating point numbers.
     Float,
@@ -72,7 +73,9 @@ impl Port {
 impl fmt::Display for Port {
     /// Writes the name and the shape: `images [1, 3, ?, ?]`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let size = |size: &Option<usize>| size.map_or("?".to_owned(), |size| size.to_string());
+        fn size(size: &Option<usize>) -> String {
+            size.map_or("?".to_owned(), |size| size.to_string())
+        }
         let sizes: Vec<String> = self.shape.iter().map(size).collect();
         let element = match self.element {
             Element::Float => "",

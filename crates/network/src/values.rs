@@ -131,6 +131,7 @@ const MOST: f64 = 0.9;
 /// Order of the numbers of corners in a list of boxes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum BoxOrder {
     /// Left, top, right, bottom.
     #[default]
@@ -153,6 +154,7 @@ impl BoxOrder {
 /// Unit of the boxes of a network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum BoxUnit {
     /// Pixels of the input.
     Pixels,
@@ -442,9 +444,9 @@ mod tests {
         }
 
         fn by_stride(scores: f32) -> Result<Family, String> {
-            let tensor = |cells: usize, row: &[f32]| {
+            fn tensor(cells: usize, row: &[f32]) -> Tensor {
                 Tensor::new(vec![1, cells, row.len()], row.repeat(cells)).unwrap()
-            };
+            }
             let outputs =
                 [4, 64, 16].map(|cells| [tensor(cells, &logits(44)), tensor(cells, &[scores; 80])]);
             let named: Vec<(&str, &Tensor)> =

@@ -62,7 +62,9 @@ fn two_people() -> RgbImage {
 #[test]
 fn the_part_of_the_image_in_the_box_is_described() {
     fn cosine(a: &[f32], b: &[f32]) -> f32 {
-        let dot = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>();
+        fn dot(a: &[f32], b: &[f32]) -> f32 {
+            a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>()
+        }
         dot(a, b) / (dot(a, a) * dot(b, b)).sqrt()
     }
 

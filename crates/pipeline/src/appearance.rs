@@ -14,6 +14,7 @@ use tagalong_vision::{Describer, Embedder};
 /// `association_weight` and the target lock. Differences are 1 minus the cosine of two vectors.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct AppearanceSettings {
     /// ONNX file of a re-identification network, relative to the config, or the name of an installed
     /// one. Empty: people are

@@ -194,13 +194,13 @@ fn refuse_unknown(root: &DeTable<'_>, options: &Options) -> Result<(), ConfigErr
         // A key of an older version gets its replacement instead of a guess by spelling.
         if let Some((_, now)) = RENAMED.iter().find(|(old, _)| *old == name) {
             let message = format!("`{name}` is now {now}");
-            return Err(ConfigError { message, span: Some(key.span()) });
+            return Err(ConfigError::new(message).or_at(Some(key.span())));
         }
         if !known.contains(&name) {
             let hint = nearest(name, known.iter().copied())
                 .map_or(String::new(), |better| format!(" did you mean `{better}`?"));
             let message = format!("unknown key `{name}`;{hint} available: {}", known.join(", "));
-            return Err(ConfigError { message, span: Some(key.span()) });
+            return Err(ConfigError::new(message).or_at(Some(key.span())));
         }
     }
     Ok(())
@@ -241,7 +241,7 @@ impl<'a, T: Settings> Section<'a, T> {
         let span = value.span();
         let DeValue::Table(mut table) = value.into_inner() else {
             let message = format!("`{name}` must be a table with the key `plugin`");
-            return Err(ConfigError { message, span: Some(span) });
+            return Err(ConfigError::new(message).or_at(Some(span)));
         };
         let config = table.remove("config");
         let settings =
@@ -291,11 +291,11 @@ impl Builder<'_> {
     fn context(&self, section: usize, index: usize) -> Context {
         // The section is in the upper half, so that no index within a section can collide with it.
         let place = ((section as u64) << 32) + index as u64;
-        Context {
-            seed: mix(mix(self.settings.seed) ^ place),
-            base_dir: self.base_dir.to_owned(),
-            wheels: self.settings.robot.wheels(),
-        }
+        Context::new(
+            mix(mix(self.settings.seed) ^ place),
+            self.base_dir.to_owned(),
+            self.settings.robot.wheels(),
+        )
     }
 
     fn detectors(
@@ -380,7 +380,7 @@ impl Builder<'_> {
         settings.describer(self.base_dir).map_err(|error| {
             let section = root.get("appearance").and_then(|value| value.get_ref().as_table());
             let span = section.and_then(|table| table.get("model")).map(Spanned::span);
-            ConfigError { message: format!("[appearance] {error}"), span }
+            ConfigError::new(format!("[appearance] {error}")).or_at(span)
         })
     }
 
@@ -399,7 +399,7 @@ impl Builder<'_> {
         // The stopping distance is known before the first frame, so an unsafe config is refused
         // here.
         if let Some(message) = too_near(plugin.stand_off_m(), robot, command_limiter) {
-            return Err(ConfigError { message, span: section.span_of("plugin") });
+            return Err(ConfigError::new(message).or_at(section.span_of("plugin")));
         }
         let name = section.settings.plugin;
         let settings = self.settings.following();
@@ -432,7 +432,7 @@ fn refuse_old_role(section: &Value<'_>) -> Result<(), ConfigError> {
     match old {
         Some(role) => {
             let message = "the role `follow` is now `track`".to_owned();
-            Err(ConfigError { message, span: Some(role.span()) })
+            Err(ConfigError::new(message).or_at(Some(role.span())))
         }
         None => Ok(()),
     }
@@ -446,7 +446,7 @@ fn list<'a>(name: &str, value: Option<Value<'a>>) -> Result<Vec<Value<'a>>, Conf
         DeValue::Array(items) => Ok(items.into_iter().collect()),
         _ => {
             let message = format!("`{name}` is a list: write [[{name}]] with double brackets");
-            Err(ConfigError { message, span: Some(span) })
+            Err(ConfigError::new(message).or_at(Some(span)))
         }
     }
 }
@@ -470,14 +470,11 @@ fn check_detectors(detectors: &[DetectorSlot], places: &[SectionSpans]) -> Resul
             continue;
         };
         let span = span.clone().or_else(|| Some(place.section.clone()));
-        return Err(ConfigError { message, span });
+        return Err(ConfigError::new(message).or_at(span));
     }
     if !detectors.iter().any(|slot| slot.settings.roles.contains(&Role::Discover)) {
         let message = "no detector discovers anybody: give one of [[detectors]] the role discover";
-        return Err(ConfigError {
-            message: message.into(),
-            span: places.first().map(|p| p.section.clone()),
-        });
+        return Err(ConfigError::new(message).or_at(places.first().map(|p| p.section.clone())));
     }
     Ok(())
 }
@@ -514,5 +511,5 @@ fn check_weighing(
          add the role weigh to a detector that has a likelihood",
         filter.name()
     );
-    Err(ConfigError { message, span: Some(span) })
+    Err(ConfigError::new(message).or_at(Some(span)))
 }

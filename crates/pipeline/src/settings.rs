@@ -19,6 +19,7 @@ use tagalong_tracking::{
 /// of a `plugin` and its settings in the sub-table `config`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct PipelineSettings {
     /// Seed of everything random. The same log, config and seed give the same bytes.
     pub seed: u64,
@@ -73,6 +74,7 @@ impl PipelineSettings {
 /// `config`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct PluginSettings {
     /// The plugin's name.
     pub plugin: String,

@@ -18,16 +18,7 @@ fn track(id: u32, camera: &Camera) -> Track {
     let person = Person { position: Point3::new(3.0, 0.4, 1.6), velocity: Vector2::new(0.5, 0.0) };
     let region = camera.upper_body(&person.position);
     let covariance = SMatrix::<f64, 5, 5>::identity() * 0.01;
-    Track {
-        id: TrackId(id),
-        estimate: Estimate { person, covariance, region },
-        seen: true,
-        occluded: false,
-        confirmed: true,
-        age: 5,
-        unseen_s: 0.0,
-        score: 3.0,
-    }
+    Track::new(TrackId(id), Estimate::new(person, covariance, region), 3.0).with_age(5)
 }
 
 fn scene(tracks: &[u32], candidates: Vec<Candidate>) -> OverlayData {

@@ -196,6 +196,7 @@ impl EventRow {
                 ("wrong-person", Some(person), Some(track))
             }
             EventKind::FalseTrack { track } => ("false-track", None, Some(track)),
+            _ => ("other", None, None),
         };
         Self {
             frame: event.frame as u64,
@@ -223,6 +224,7 @@ fn sentence(kind: &EventKind) -> String {
             format!("Track {track}, which began with person {began_with}, is on person {person}.")
         }
         EventKind::FalseTrack { track } => format!("Track {track} is where nobody is."),
+        other => format!("{other:?}"),
     }
 }
 

@@ -31,21 +31,27 @@ pub struct ApproachSettings {
     /// Kind of the approacher.
     pub by: ApproachBy,
     /// Time at which it appears and sets out, s.
+    #[schemars(range(min = 0.0, max = 86_400.0))]
     pub start_s: f64,
     /// Direction from the robot to its start, degrees, from the robot's heading at that time to
     /// the left. The nearest direction with enough room is taken where a wall is too near.
+    #[schemars(range(min = -360.0, max = 360.0))]
     pub bearing_deg: f64,
     /// Time in which it would reach a robot at rest, s: the speed times this is the distance of its
     /// start, within 2 to 6 m.
+    #[schemars(range(min = 0.1, max = 60.0))]
     pub lead_s: f64,
     /// Speed, m/s.
+    #[schemars(range(min = 0.05, max = 2.0))]
     pub speed_mps: f64,
     /// It turns to the robot all the time; otherwise it keeps the direction in which the robot was
     /// at the start.
     pub aims: bool,
     /// Body height of a person, m; by chance if left out.
+    #[schemars(range(min = 0.8, max = 2.2))]
     pub height_m: Option<f64>,
     /// Length, width and height of a trolley, m.
+    #[schemars(inner(range(min = 0.1, max = 2.0)))]
     pub size_m: [f64; 3],
 }
 
@@ -77,24 +83,6 @@ pub enum ApproachBy {
 }
 
 impl ApproachSettings {
-    /// Returns the conditions on the settings, each with the message for a violation.
-    pub(crate) fn rules(&self) -> [(bool, &'static str); 5] {
-        [
-            ((0.0..=86_400.0).contains(&self.start_s), "approach.start_s must be in 0 to 86400"),
-            (
-                (-360.0..=360.0).contains(&self.bearing_deg),
-                "approach.bearing_deg must be in -360 to 360",
-            ),
-            ((0.1..=60.0).contains(&self.lead_s), "approach.lead_s must be in 0.1 to 60"),
-            ((0.05..=2.0).contains(&self.speed_mps), "approach.speed_mps must be in 0.05 to 2"),
-            (
-                self.size_m.iter().all(|side| (0.1..=2.0).contains(side))
-                    && self.height_m.is_none_or(|height| (0.8..=2.2).contains(&height)),
-                "approach.size_m must be in 0.1 to 2, approach.height_m in 0.8 to 2.2",
-            ),
-        ]
-    }
-
     /// Returns the distance from the robot at which the approacher appears, m.
     pub fn distance_m(&self) -> f64 {
         (self.speed_mps * self.lead_s).clamp(DISTANCE_M[0], DISTANCE_M[1])

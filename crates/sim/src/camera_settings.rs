@@ -28,12 +28,16 @@ pub struct CameraSettings {
     /// several times faster.
     pub colour: bool,
     /// Columns.
+    #[schemars(range(min = 8, max = 4096))]
     pub width: usize,
     /// Rows.
+    #[schemars(range(min = 8, max = 4096))]
     pub height: usize,
     /// Horizontal field of view, degrees.
+    #[schemars(range(min = 10.0, max = 150.0))]
     pub field_of_view_deg: f64,
     /// Images per second.
+    #[schemars(range(min = 0.1, max = 100.0))]
     pub rate_hz: f64,
     /// Height above the floor, m.
     pub height_m: f64,
@@ -49,9 +53,11 @@ pub struct CameraSettings {
     pub exposure_s: f64,
     /// From the first row to the last, s; 0 takes all rows at once. The stamp is
     /// that of the middle row, and people stand still meanwhile. Not for mirrors.
+    #[schemars(range(min = 0.0, max = 0.05))]
     pub rolling_shutter_s: f64,
     /// The depth of an `rgbd` camera with colour is taken this much later than
     /// the colour, s; its stamp says so.
+    #[schemars(range(min = 0.0, max = 0.02))]
     pub depth_offset_s: f64,
     /// Typical error of the mount as stated in the log, degrees and (in hundredths) metres.
     pub mount_error_deg: f64,

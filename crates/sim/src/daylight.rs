@@ -27,13 +27,17 @@ pub struct Daylight {
     /// Number of windows.
     pub windows: usize,
     /// Brightness of the sky in them, as the illuminance of a white surface, lx.
+    #[schemars(range(min = 0.0, max = 50_000.0))]
     pub sky_lux: f64,
     /// Illuminance of a surface that faces the sun, lx; 0 is an overcast day.
+    #[schemars(range(min = 0.0, max = 130_000.0))]
     pub sun_lux: f64,
     /// Direction of the sun from straight out of the windows towards the far end of the room,
     /// degrees.
+    #[schemars(range(min = -80.0, max = 80.0))]
     pub azimuth_deg: f64,
     /// Height of the sun above the horizon, degrees.
+    #[schemars(range(min = 2.0, max = 80.0))]
     pub elevation_deg: f64,
 }
 
@@ -51,20 +55,11 @@ impl Default for Daylight {
 
 impl Daylight {
     /// Returns the conditions on the settings, each with the message for a violation.
-    pub(crate) fn rules(&self, room: &RoomSettings) -> [(bool, &'static str); 5] {
-        [
-            (
-                self.windows > 0 && self.windows as f64 * LEAST_PITCH_M <= room.size_m[0],
-                "light.day.windows must be at least 1, and 1.6 m of wall long each",
-            ),
-            ((0.0..=50_000.0).contains(&self.sky_lux), "light.day.sky_lux must be in 0 to 50000"),
-            ((0.0..=130_000.0).contains(&self.sun_lux), "light.day.sun_lux must be in 0 to 130000"),
-            (self.azimuth_deg.abs() <= 80.0, "light.day.azimuth_deg must be in -80 to 80"),
-            (
-                (2.0..=80.0).contains(&self.elevation_deg),
-                "light.day.elevation_deg must be in 2 to 80",
-            ),
-        ]
+    pub(crate) fn rules(&self, room: &RoomSettings) -> [(bool, &'static str); 1] {
+        [(
+            self.windows > 0 && self.windows as f64 * LEAST_PITCH_M <= room.size_m[0],
+            "light.day.windows must be at least 1, and 1.6 m of wall long each",
+        )]
     }
 
     /// Returns the panes, bright as the sky, with their frames before the wall of a room.

@@ -161,7 +161,9 @@ mod tests {
 
     #[test]
     fn a_footprint_surrounds_the_wheels() {
-        let holds = |corners: &[[f64; 2]]| rules(corners).iter().all(|(holds, _)| *holds);
+        fn holds(corners: &[[f64; 2]]) -> bool {
+            rules(corners).iter().all(|(holds, _)| *holds)
+        }
         assert!(holds(&[]) && holds(&LONG));
         assert!(!holds(&LONG[..2]) && !holds(&LONG.map(|[x, y]| [x + 1.0, y])));
         assert!(!holds(&LONG.map(|[x, y]| [f64::NAN * x, y])));

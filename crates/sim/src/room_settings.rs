@@ -9,8 +9,10 @@ use crate::ramp::Ramp;
 #[serde(default, deny_unknown_fields)]
 pub struct RoomSettings {
     /// Length and width, m.
+    #[schemars(inner(range(min = 1.0, max = 200.0)))]
     pub size_m: [f64; 2],
     /// Height, m.
+    #[schemars(range(min = 2.0, max = 20.0))]
     pub height_m: f64,
     /// The walls have wallpaper; without it stereo finds nothing on them.
     pub wallpaper: bool,
@@ -18,6 +20,7 @@ pub struct RoomSettings {
     pub floor: Floor,
     /// Pieces of furniture of any kind at random places along the walls, off
     /// everybody's way.
+    #[schemars(range(max = 500))]
     pub clutter: usize,
     /// The door at the far end stands open to a dark room.
     pub open_door: bool,

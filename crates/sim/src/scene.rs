@@ -6,7 +6,7 @@ use crate::posture::Posture;
 use crate::room_settings::RoomSettings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_config::ConfigError;
+use tagalong_config::{ConfigError, check_settings};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
 
@@ -37,6 +37,7 @@ pub struct Scene {
     /// [`Split`].
     pub seed: u64,
     /// Length of the log, s.
+    #[schemars(range(min = 1e-6, max = 86_400.0))]
     pub duration_s: f64,
     /// Wanderers with random looks and ways, besides `people`.
     pub crowd: usize,
@@ -70,6 +71,7 @@ pub struct Scene {
     pub furniture: Vec<Furniture>,
     /// Blocks of wall, which people with a walk other than `plain` find ways around.
     #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 500))]
     pub blocks: Vec<Block>,
     /// People.
     pub people: Vec<PersonSettings>,
@@ -187,25 +189,6 @@ impl Scene {
         let camera = &self.camera;
         let rules = [
             (self.seed < Split::SEEDS_END, "seed must be below 3000000000"),
-            (self.room.clutter <= 500, "room.clutter must be at most 500"),
-            (
-                self.duration_s > 0.0 && self.duration_s <= 86_400.0,
-                "duration_s must be in 0 to 86400",
-            ),
-            (
-                self.room.size_m.iter().all(|m| (1.0..=200.0).contains(m)),
-                "room.size_m must be in 1 to 200",
-            ),
-            ((2.0..=20.0).contains(&self.room.height_m), "room.height_m must be in 2 to 20"),
-            (
-                (8..=4096).contains(&camera.width) && (8..=4096).contains(&camera.height),
-                "camera.width and camera.height must be in 8 to 4096",
-            ),
-            (
-                (10.0..=150.0).contains(&camera.field_of_view_deg),
-                "camera.field_of_view_deg must be in 10 to 150",
-            ),
-            ((0.1..=100.0).contains(&camera.rate_hz), "camera.rate_hz must be in 0.1 to 100"),
             (
                 camera.max_depth_m > camera.min_depth_m,
                 "camera.max_depth_m must be above min_depth_m",
@@ -215,29 +198,13 @@ impl Scene {
                 "camera.colour = false needs camera.kind = \"rgbd\": it has depth besides",
             ),
             (
-                (0.0..=0.05).contains(&camera.rolling_shutter_s),
-                "camera.rolling_shutter_s must be in 0 to 0.05",
-            ),
-            (
                 camera.rolling_shutter_s == 0.0 || camera.kind != CameraKind::Panorama,
                 "camera.rolling_shutter_s is not for camera.kind = \"panorama\"",
-            ),
-            (
-                (0.0..=0.02).contains(&camera.depth_offset_s),
-                "camera.depth_offset_s must be in 0 to 0.02",
             ),
             (
                 camera.depth_offset_s == 0.0 || camera.kind == CameraKind::Rgbd && camera.colour,
                 "camera.depth_offset_s needs camera.kind = \"rgbd\" with colour",
             ),
-            (
-                (0.005..=1.0).contains(&self.robot.wheel_radius_m),
-                "robot.wheel_radius_m must be in 0.005 to 1",
-            ),
-            ((0.0..=20.0).contains(&self.robot.behind_m), "robot.behind_m must be in 0 to 20"),
-            (self.robot.ticks_per_turn > 0, "robot.ticks_per_turn must be at least 1"),
-            (self.people.iter().all(|p| p.companions <= 3), "companions must be at most 3"),
-            (self.blocks.len() <= 500, "there must be at most 500 blocks"),
             (self.number_of_people() <= 200, "there must be at most 200 people"),
             (
                 self.people.iter().all(|p| !p.path.is_empty() || p.wander > 0),
@@ -247,7 +214,6 @@ impl Scene {
                 self.people.iter().all(|p| p.posture != Posture::Seated || !p.path.is_empty()),
                 "a seated person needs a path of one point: the place of the chair",
             ),
-            (self.people.iter().all(|p| p.wander <= 1000), "wander must be at most 1000"),
             (
                 self.people.iter().all(|p| p.leaves_s.is_none_or(|leaves_s| leaves_s > p.enters_s)),
                 "leaves_s must be after enters_s",
@@ -256,34 +222,26 @@ impl Scene {
                 self.people.iter().all(|p| p.subject.max(p.look) < Some(SUBJECTS)),
                 "subject and look must be below 500",
             ),
-            (
-                self.people.iter().all(|p| (0.0..=2.0).contains(&p.speed_mps)),
-                "speed_mps must be in 0 to 2",
-            ),
-            (
-                self.people.iter().all(|p| p.rest_s.iter().all(|s| (0.0..=3600.0).contains(s))),
-                "rest_s must be in 0 to 3600",
-            ),
         ];
-        let webcams = self.webcams.iter().flat_map(WebcamSettings::rules);
         let laser = self.laser.iter().flat_map(LaserSettings::rules);
         let lidar = self.lidar.iter().flat_map(LidarSettings::rules);
         let ramp = self.room.ramp.iter().flat_map(Ramp::rules);
         let day = self.light.day.iter().flat_map(|day| day.rules(&self.room));
-        let approach = self.approach.iter().flat_map(ApproachSettings::rules);
         let outline = footprint::rules(&self.robot.footprint);
         let has_sides = self.light.day.is_some() || !self.webcams.is_empty();
         let variation = self.variation.rules(has_sides);
-        let parts = webcams.chain(laser).chain(ramp).chain(day).chain(approach).chain(outline);
+        let parts = laser.chain(ramp).chain(day).chain(outline);
         let is_empty = self.number_of_people() == 0 && self.blocks.is_empty();
         let bench = self.follow_bench.iter().flat_map(|bench| bench.rules(is_empty));
         let parts = parts.chain(bench).chain(lidar);
-        let blocks = self.blocks.iter().flat_map(Block::rules);
-        let parts = parts.chain(variation).chain(self.reacting.rules()).chain(blocks);
+        let parts = parts.chain(variation).chain(self.reacting.rules());
         let mut rules = rules.into_iter().chain(camera.mirror.rules()).chain(parts);
         match rules.find(|(holds, _)| !holds) {
             Some((_, message)) => Err(ConfigError::new(message)),
-            None => self.check_parts().map_err(ConfigError::new),
+            None => check_settings(self)
+                .map_err(|error| error.to_string())
+                .and_then(|()| self.check_parts())
+                .map_err(ConfigError::new),
         }
     }
 }
@@ -340,14 +298,17 @@ pub struct RobotSettings {
     pub path: Vec<[f64; 2]>,
     /// Comes after the first person of the scene and stays this far away, m, whatever the
     /// path; 0 keeps to the path.
+    #[schemars(range(min = 0.0, max = 20.0))]
     pub behind_m: f64,
     /// Speed, m/s.
     pub speed_mps: f64,
     /// Half the distance between the wheels, m.
     pub half_separation_m: f64,
     /// Radius of the wheels, as the odometry believes, m.
+    #[schemars(range(min = 0.005, max = 1.0))]
     pub wheel_radius_m: f64,
     /// Ticks of an encoder in one turn of its wheel.
+    #[schemars(range(min = 1))]
     pub ticks_per_turn: u32,
     /// Time constant of the wheel speeds, s.
     pub response_s: f64,
@@ -436,16 +397,19 @@ pub struct PersonSettings {
     pub path: Vec<[f64; 2]>,
     /// Number of points that follow the path, which the seed chooses: anywhere in the
     /// room, off furniture and the robot's start.
+    #[schemars(range(max = 1000))]
     pub wander: usize,
     /// Way of walking.
     #[serde(skip_serializing_if = "Walk::is_plain")]
     pub walk: Walk,
     /// Preferred speed, m/s.
+    #[schemars(range(min = 0.0, max = 2.0))]
     pub speed_mps: f64,
     /// Stands until then, s.
     pub start_s: f64,
     /// Rests at the points of the path for this long on every visit, s; none where
     /// the list ends.
+    #[schemars(inner(range(min = 0.0, max = 3600.0)))]
     pub rest_s: Vec<f64>,
     /// Time before which the person is not in the room, s: a detector that learns the appearance of
     /// the empty room needs to see it.
@@ -463,6 +427,7 @@ pub struct PersonSettings {
     /// Posture.
     pub posture: Posture,
     /// Number of others that walk along, 0.6 to 1 m apart; they count as people of their own.
+    #[schemars(range(max = 3))]
     pub companions: usize,
     /// Direction of the face at the start, degrees; the way ahead if left out.
     pub heading_deg: Option<f64>,
@@ -522,7 +487,9 @@ mod tests {
     fn in_turn_everybody_has_the_room_for_themselves() {
         let text = "[[people]]\nwander = 2\nenters_s = 9.0\n[[people]]\nwander = 2\n";
         let scene = Scene::parse(text).unwrap().in_turn(20.0);
-        let times = |person: &PersonSettings| (person.enters_s, person.leaves_s);
+        fn times(person: &PersonSettings) -> (f64, Option<f64>) {
+            (person.enters_s, person.leaves_s)
+        }
         let times: Vec<_> = scene.people.iter().map(times).collect();
         assert_eq!(times, [(9.0, Some(29.0)), (29.0, Some(49.0))]);
         assert_eq!(scene.duration_s, 49.0);

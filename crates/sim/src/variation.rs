@@ -178,7 +178,7 @@ impl Change {
 
     fn fails(&self, why: &str) -> ConfigError {
         let message = format!("cannot vary `{}`: {why}", self.key);
-        ConfigError { message, span: Some(self.span.clone()) }
+        ConfigError::new(message).or_at(Some(self.span.clone()))
     }
 }
 
@@ -247,7 +247,7 @@ impl Rule {
         let span = value.span();
         let DeValue::Table(table) = value.get_ref() else {
             let message = format!("`{key}` does not say how it varies: {HOW}");
-            return Err(ConfigError { message, span: Some(span) });
+            return Err(ConfigError::new(message).or_at(Some(span)));
         };
         let names = ["between", "one_of", "in_turn", "same_as"];
         if names.iter().any(|name| table.contains_key(*name)) {
@@ -273,7 +273,7 @@ impl Rule {
                     "`{key}` does not say how it varies: {HOW}, numbers in rising order, lists not \
                  empty; `apart` needs fractions or a list of three or more"
                 );
-                ConfigError { message, span: Some(span.clone()) }
+                ConfigError::new(message).or_at(Some(span.clone()))
             })?;
         Ok(Self { key, span, source, apart })
     }
@@ -318,7 +318,7 @@ impl Rule {
             .ok_or_else(|| {
                 let message =
                     format!("`{}` cannot be the same as `{other}`: it is not there", self.key);
-                ConfigError { message, span: Some(self.span.clone()) }
+                ConfigError::new(message).or_at(Some(self.span.clone()))
             })?
             .clone();
         let value = toml::Value::deserialize(ValueDeserializer::from(value))?.to_string();

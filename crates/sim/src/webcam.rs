@@ -24,12 +24,16 @@ pub struct WebcamSettings {
     /// Looks this far down, degrees.
     pub pitch_down_deg: f64,
     /// Horizontal field of view, degrees.
+    #[schemars(range(min = 10.0, max = 150.0))]
     pub field_of_view_deg: f64,
     /// Columns.
+    #[schemars(range(min = 8, max = 4096))]
     pub width: usize,
     /// Rows.
+    #[schemars(range(min = 8, max = 4096))]
     pub height: usize,
     /// Images per second.
+    #[schemars(range(min = 0.1, max = 100.0))]
     pub rate_hz: f64,
 }
 
@@ -49,21 +53,6 @@ impl Default for WebcamSettings {
 }
 
 impl WebcamSettings {
-    /// Returns the conditions on the settings, each with the message for a violation.
-    pub(crate) fn rules(&self) -> [(bool, &'static str); 3] {
-        [
-            (
-                (8..=4096).contains(&self.width) && (8..=4096).contains(&self.height),
-                "webcams: width and height must be in 8 to 4096",
-            ),
-            (
-                (10.0..=150.0).contains(&self.field_of_view_deg),
-                "webcams: field_of_view_deg must be in 10 to 150",
-            ),
-            ((0.1..=100.0).contains(&self.rate_hz), "webcams: rate_hz must be in 0.1 to 100"),
-        ]
-    }
-
     /// The camera; its `robot_from_camera` is its pose in the **world**.
     pub fn camera(&self) -> Camera {
         let f = 0.5 * self.width as f64 / (0.5 * self.field_of_view_deg.to_radians()).tan();

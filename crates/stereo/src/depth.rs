@@ -186,10 +186,10 @@ fn unusable(
         pixels.fold((u8::MAX, 0), |(low, high), p| (low.min(*p), high.max(*p)))
     }
 
-    let bright = |image: &GreyImage| {
+    fn bright(image: &GreyImage) -> bool {
         let bright = count_up(image, |p| u32::from(p >= SATURATED));
         bright as f64 > MAX_SATURATED * image.pixels().len() as f64
-    };
+    }
     let ((low, high), (low_right, high_right)) = (range(left), range(right));
     if high.min(high_right) <= BLACK {
         Some("stereo: image is black")

@@ -28,6 +28,7 @@ pub struct Matcher {
 
 /// Disparities of the left image of a pair, row by row.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct Disparities<'a> {
     /// Number of columns.
     pub width: usize,

@@ -20,6 +20,7 @@ const DISTINCT: f32 = 0.7;
 
 /// Relative position of the images of a pair.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Rectification {
     /// Number of points of the left image that were found in the right one.
     pub points: usize,

@@ -6,6 +6,7 @@ use tagalong_core::{Error, Result};
 /// Method of stereo matching.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Method {
     /// Best match of a window: fast; holes where there is no texture.
     Block,

@@ -10,7 +10,7 @@ struct Nearest;
 impl Detector for Nearest {
     fn capabilities(&self) -> Capabilities {
         let inputs = Inputs::NONE.require(Input::Laser);
-        Capabilities { inputs, discovers: true, ..Capabilities::default() }
+        Capabilities::new(inputs).discovering()
     }
 
     fn detect(

@@ -23,7 +23,7 @@ struct Swinging;
 impl Detector for Swinging {
     fn capabilities(&self) -> Capabilities {
         let inputs = Inputs::NONE.require(Radar::INPUT);
-        Capabilities { inputs, discovers: true, ..Capabilities::default() }
+        Capabilities::new(inputs).discovering()
     }
 
     fn detect(

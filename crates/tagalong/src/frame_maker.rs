@@ -332,7 +332,9 @@ mod tests {
     #[test]
     fn what_makes_no_frame_is_refused_with_the_remedy() {
         let mut maker = maker();
-        let small = || DepthImage::filled(4, 4, 1.0);
+        fn small() -> DepthImage {
+            DepthImage::filled(4, 4, 1.0)
+        }
         let right = GreyImage::filled(8, 6, 0);
         let mut blind = FrameMaker::without_camera();
         let camera = Arc::clone(&maker.camera);

@@ -94,16 +94,10 @@ mod tests {
         let position = Point3::new(3.0, 0.0, 1.6) + Vector3::y() * off_m;
         let person = Person { position, velocity: Vector2::zeros() };
         let covariance = SMatrix::identity() * variance_m2;
-        Track {
-            id: TrackId(1),
-            estimate: Estimate { person, covariance, region: Rect::default() },
-            seen: false,
-            occluded: false,
-            confirmed: true,
-            age: 9,
-            unseen_s: 1.0,
-            score: 5.0,
-        }
+        Track::new(TrackId(1), Estimate::new(person, covariance, Rect::default()), 5.0)
+            .with_seen(false)
+            .with_age(9)
+            .with_unseen_s(1.0)
     }
 
     fn is_kept(x: f64, track: Track, log_ratio: f64, settings: &BirthSettings) -> bool {

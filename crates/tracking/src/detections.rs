@@ -56,11 +56,7 @@ impl DetectionSet {
     pub(crate) fn matched(&self) -> Vec<Matched<'_>> {
         self.pairs
             .iter()
-            .map(|(id, index, weight)| Matched {
-                id: *id,
-                detection: &self.all[*index].detection,
-                weight: *weight,
-            })
+            .map(|(id, index, weight)| Matched::weighted(*id, &self.all[*index].detection, *weight))
             .collect()
     }
 
@@ -271,7 +267,7 @@ mod tests {
     #[test]
     fn two_people_one_behind_the_other_are_two_unless_their_range_is_unknown() {
         fn vague(d: Detection) -> Detection {
-            Detection { covariance: Matrix3::identity() * 4.0, ..d }
+            d.with_covariance(Matrix3::identity() * 4.0)
         }
 
         let settings = MergeSettings::default();
@@ -286,11 +282,9 @@ mod tests {
     fn detections_at_one_place_are_of_one_person_whatever_the_image_says() {
         fn at(x: f64, y: f64, region_x: f64) -> Detection {
             let region = Rect::new(region_x, 0.0, 100.0, 100.0);
-            Detection {
-                image: Some(ImageBox::upper_body(region)),
-                covariance: Matrix3::identity() * 0.02,
-                ..person(x, y)
-            }
+            person(x, y)
+                .with_image(ImageBox::upper_body(region))
+                .with_covariance(Matrix3::identity() * 0.02)
         }
 
         let settings = MergeSettings::default();
@@ -308,28 +302,16 @@ mod tests {
             position: Point3::new(3.0, 0.0, 1.6),
             velocity: nalgebra::Vector2::zeros(),
         };
-        let estimate = tagalong_core::Estimate {
-            person,
-            covariance: nalgebra::SMatrix::identity(),
-            region: Rect::default(),
-        };
-        let track = |id: &u32| Track {
-            id: TrackId(*id),
-            estimate: estimate.clone(),
-            seen: false,
-            occluded: false,
-            confirmed: true,
-            age: 0,
-            unseen_s: 0.0,
-            score: 1.0,
-        };
+        let estimate =
+            tagalong_core::Estimate::new(person, nalgebra::SMatrix::identity(), Rect::default());
+        let track = |id: &u32| Track::new(TrackId(*id), estimate.clone(), 1.0).with_seen(false);
         ids.iter().map(track).collect()
     }
 
     #[test]
     fn the_least_likely_of_too_many_detections_are_dropped() {
         let mut set = DetectionSet::default();
-        let scored = [2.0, 0.5, 3.0].map(|score| Detection { score, ..person(2.0 + score, 0.0) });
+        let scored = [2.0, 0.5, 3.0].map(|score| person(2.0 + score, 0.0).with_score(score));
         set.add(scored.map(|detection| PendingDetection::new(detection, 0, true)));
         set.limit(2);
         let kept: Vec<f64> = set.undecided().into_iter().map(|index| set.score(index)).collect();
@@ -340,14 +322,14 @@ mod tests {
     #[test]
     fn a_detection_goes_to_the_track_that_it_is_most_probably_of() {
         fn pair(track: usize, detection: usize, weight: f64) -> Association {
-            Association { track, detection, weight }
+            Association::new(track, detection, weight)
         }
 
         let mut set = DetectionSet::default();
         let detections = [person(2.0, 0.0), person(3.0, 0.0), person(4.0, 0.0), person(5.0, 0.0)];
         set.add(detections.map(|detection| PendingDetection::new(detection, 0, true)));
         let pairs = vec![pair(0, 0, 0.6), pair(0, 1, 0.3), pair(1, 1, 0.5)];
-        let answer = Associations { pairs, spent: vec![2] };
+        let answer = Associations::new(pairs).with_spent(vec![2]);
         set.take_over(&answer, &tracks(&[7, 9]), &[0, 1, 2, 3]);
         let fates: Vec<_> = (0..4).map(|i| set.get(i).fate).collect();
         let first = Fate::Matched(TrackId(7));

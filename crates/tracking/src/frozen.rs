@@ -13,14 +13,20 @@ pub(crate) fn held(track: &Track, motion: &EgoMotion, camera: &Camera) -> Track 
     (position.x, position.y) = (place.x, place.y);
     let velocity = motion.apply_to_velocity(person.velocity);
     let axes = axes(motion);
-    let estimate = Estimate {
-        person: Person { position, velocity },
-        covariance: axes * covariance * axes.transpose(),
-        region: camera.upper_body(&position),
-    };
+    let estimate = Estimate::new(
+        Person { position, velocity },
+        axes * covariance * axes.transpose(),
+        camera.upper_body(&position),
+    );
     let age = track.age.saturating_add(1);
     let unseen_s = track.unseen_s + motion.dt;
-    Track { estimate, seen: false, occluded: false, age, unseen_s, ..track.clone() }
+    track
+        .clone()
+        .with_estimate(estimate)
+        .with_seen(false)
+        .with_occluded(false)
+        .with_age(age)
+        .with_unseen_s(unseen_s)
 }
 
 /// Returns the turn of the axes of (x, y, z, vx, vy).

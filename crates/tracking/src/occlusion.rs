@@ -254,7 +254,9 @@ mod tests {
             }
 
             let camera = camera();
-            let region = |([x, y], side, _): &([f64; 2], f64, f64)| Rect::new(*x, *y, *side, *side);
+            fn region(([x, y], side, _): &([f64; 2], f64, f64)) -> Rect {
+                Rect::new(*x, *y, *side, *side)
+            }
             let mut occluders: Vec<Occluder> = Vec::new();
             for b in &boxes[1..] {
                 occluders.push(Occluder::new(region(b), &at(b.2), &Matrix3::zeros(), &camera));

@@ -175,7 +175,7 @@ mod tests {
 
     impl Detector for Scored {
         fn capabilities(&self) -> Capabilities {
-            Capabilities { inputs: Inputs::NONE, discovers: false, tracks: true, weighs: false }
+            Capabilities::new(Inputs::NONE).tracking()
         }
 
         fn detect(&mut self, _: &Frame, _: &Query<'_>, _: &mut Funnel) -> Result<Vec<Detection>> {
@@ -205,16 +205,7 @@ mod tests {
     fn track() -> Track {
         let person = Person { position: Point3::new(3.0, 0.0, 1.6), velocity: Vector2::zeros() };
         let covariance = SMatrix::identity();
-        Track {
-            id: TrackId(1),
-            estimate: Estimate { person, covariance, region: Rect::default() },
-            seen: true,
-            occluded: false,
-            confirmed: true,
-            age: 1,
-            unseen_s: 0.0,
-            score: 1.0,
-        }
+        Track::new(TrackId(1), Estimate::new(person, covariance, Rect::default()), 1.0).with_age(1)
     }
 
     #[test]

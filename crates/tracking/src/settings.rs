@@ -6,6 +6,7 @@ use crate::ReidentificationSettings;
 /// Handling of stamps that jump.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct ClockSettings {
     /// A frame that is older than the previous one by at most this many seconds came out of order
     /// and is dropped. If it is older by more, the clock was set back, and all tracks end.
@@ -29,6 +30,7 @@ impl Default for ClockSettings {
 /// Merging of detections, and of tracks, of one person.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct MergeSettings {
     /// Two detections nearer to each other on the floor than this belong to one person, m; the one
     /// with the higher score is kept.
@@ -80,6 +82,7 @@ pub struct TrackerSettings {
 /// Occlusion of people by nearer ones.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct OcclusionSettings {
     /// A person is hidden if a smaller part than this is visible behind nearer people, and has left
     /// the image if a smaller part is inside.
@@ -108,6 +111,7 @@ impl Default for OcclusionSettings {
 /// likelier explanation of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct BirthSettings {
     /// Density of new people in a frame, per m² of the floor. A track keeps a detection only if its
     /// own density at that place, which falls as the track becomes uncertain, is higher. 0: each
@@ -144,6 +148,7 @@ impl Default for BirthSettings {
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
 )]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Role {
     /// It finds people that are not tracked yet.
     Discover,

@@ -114,16 +114,14 @@ impl TrackTable {
 
     fn track(&self, id: TrackId, estimate: Estimate) -> Option<Track> {
         let record = self.records.get(&id)?;
-        Some(Track {
-            id,
-            estimate,
-            seen: record.observation.is_supported(),
-            occluded: record.observation == Observation::Occluded,
-            confirmed: record.health.confirmed,
-            age: record.age,
-            unseen_s: record.unseen_s,
-            score: record.health.log_odds,
-        })
+        Some(
+            Track::new(id, estimate, record.health.log_odds)
+                .with_seen(record.observation.is_supported())
+                .with_occluded(record.observation == Observation::Occluded)
+                .with_confirmed(record.health.confirmed)
+                .with_age(record.age)
+                .with_unseen_s(record.unseen_s),
+        )
     }
 }
 
@@ -131,7 +129,7 @@ impl TrackTable {
 mod tests {
     use super::*;
 
-    const HEALTH: TrackHealth = TrackHealth { confirmed: false, log_odds: 1.0 };
+    const HEALTH: TrackHealth = TrackHealth::new(false, 1.0);
 
     #[test]
     fn a_number_is_never_used_twice() {
@@ -153,7 +151,7 @@ mod tests {
         let mut table = TrackTable::default();
         for confirmed in [false, true, false] {
             let id = table.next_id().unwrap();
-            table.start(id, TrackHealth { confirmed, ..HEALTH }, 0);
+            table.start(id, TrackHealth::new(confirmed, 1.0), 0);
         }
         assert_eq!(table.tentative_ids(), [TrackId(1), TrackId(3)]);
     }
@@ -163,7 +161,7 @@ mod tests {
         let mut table = TrackTable::default();
         for log_odds in [1.0, 3.0, 1.0, 2.0] {
             let id = table.next_id().unwrap();
-            table.start(id, TrackHealth { log_odds, ..HEALTH }, 0);
+            table.start(id, TrackHealth::new(false, log_odds), 0);
         }
         assert_eq!(table.too_many(2), [TrackId(3), TrackId(1)]);
         assert_eq!(table.too_many(4), []);

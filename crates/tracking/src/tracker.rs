@@ -275,7 +275,7 @@ impl Tracker {
     fn gate(&self, motion: Option<EgoMotion>) -> Gate<'static> {
         let start_log_odds = self.manager.plugin().start_log_odds();
         let dt_s = motion.map_or(0.0, |motion| motion.dt);
-        Gate { dt_s, start_log_odds, appearance: &[] }
+        Gate::new(dt_s, start_log_odds)
     }
 
     /// Searches for each track, from near to far, except for those that a nearer, detected person
@@ -357,7 +357,7 @@ impl Tracker {
         let appearance = self.reidentifier.compare(frame, predicted, &found, !births.are_off());
         let appearance =
             appearance.map_err(|error| StepError::of_stage("[appearance]", frame, error))?;
-        let gate = &Gate { appearance: &appearance, ..*gate };
+        let gate = &gate.with_appearance(&appearance);
         let mut answer = self
             .associator
             .ask(frame.index, |associator| associator.associate(predicted, &found, gate))?;
@@ -383,7 +383,8 @@ impl Tracker {
         let unmatched = detections.undecided_detections();
         let metered = self.search.likelihood().map(Metered::new);
         let likelihood = metered.as_ref().map(|metered| metered as &dyn Likelihood);
-        let evidence = Evidence { frame, matched: &matched, unmatched: &unmatched, likelihood };
+        let evidence =
+            Evidence::new(frame, &matched).with_unmatched(&unmatched).with_likelihood(likelihood);
         let mut supports = self.filter.call(frame.index, |filter| filter.update(&evidence))?;
         log.weighing = metered.as_ref().map(Metered::weighing).unwrap_or_default();
         if self.visualises {
@@ -425,7 +426,7 @@ impl Tracker {
             .iter()
             .filter_map(|track| {
                 let observation = self.table.observation(track.id)?;
-                Some(ObservedTrack { track, observation })
+                Some(ObservedTrack::new(track, observation))
             })
             .collect();
         let changes = self.manager.ask(frame.index, |manager| manager.manage(&observed))?;
@@ -509,11 +510,7 @@ impl Tracker {
         pending: &PendingDetection,
     ) -> Result<Fate, StepError> {
         let PendingDetection { detection, detector_log_odds, discovered, .. } = pending;
-        let candidate = Unassociated {
-            detection,
-            detector_log_odds: *detector_log_odds,
-            discovered: *discovered,
-        };
+        let candidate = Unassociated::new(detection, *detector_log_odds, *discovered);
         let answer = self.manager.ask(frame.index, |manager| manager.initiate(id, &candidate))?;
         let health = match answer {
             Initiation::Start(health) => health,

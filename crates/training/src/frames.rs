@@ -139,7 +139,7 @@ fn show_scene(number: u64, group: u64, trainer: &mut dyn Trainer) -> Result<(), 
 
 /// Converts the truth of a scene. All people count, because the trainer decides by visible surface.
 fn of_truth(truth: &Truth) -> AnnotatedPerson {
-    AnnotatedPerson { head: truth.head_in_robot, counts: true, visible: truth.visible_fraction }
+    AnnotatedPerson::new(truth.head_in_robot).with_visible(truth.visible_fraction)
 }
 
 /// Passes the frames of a log to a trainer.
@@ -216,7 +216,7 @@ fn of_row(row: &people::Row, frame: &Frame) -> Option<AnnotatedPerson> {
         }
         (None, None) => return None,
     };
-    Some(AnnotatedPerson { head, counts: !row.ignore, visible: row.visible })
+    Some(AnnotatedPerson::new(head).with_counts(!row.ignore).with_visible(row.visible))
 }
 
 /// Returns the person in a box, as far away as the trunk; `None` without depth there.
@@ -231,7 +231,7 @@ fn of_box(region: &Region, frame: &Frame) -> Option<AnnotatedPerson> {
     let depth_m = frame.depth().ok()?.surface_m(&trunk)?;
     let pixel = Point2::new(region.x + 0.5 * region.width, region.y + HEAD_IN_BOX * region.height);
     let head = frame.camera.back_project(pixel, depth_m + HEAD_RADIUS_M);
-    Some(AnnotatedPerson { head, counts: true, visible: 1.0 })
+    Some(AnnotatedPerson::new(head))
 }
 
 /// Returns the card: the origin of the model, and a table of its scores.

@@ -44,10 +44,8 @@ pub fn add(number: u64, trainer: &mut dyn Trainer) -> Result<usize, Failure> {
         let people: Vec<AnnotatedPerson> = shot
             .truth
             .iter()
-            .map(|person| AnnotatedPerson {
-                head: person.head_in_robot,
-                counts: true,
-                visible: person.visible_fraction,
+            .map(|person| {
+                AnnotatedPerson::new(person.head_in_robot).with_visible(person.visible_fraction)
             })
             .collect();
         trainer.add_frame(&frame(scan), &people, None, number).map_err(Failure::failed)?;

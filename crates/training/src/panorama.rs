@@ -74,10 +74,10 @@ pub fn train(session: &Session<'_>, args: &TrainArgs) -> Outcome {
 }
 
 fn card(args: &TrainArgs, rooms: &[Room], figures: &toml::Table) -> String {
-    let scene = |room: &Room| {
+    fn scene(room: &Room) -> toml::Value {
         let Room { seed, each_s } = room;
         toml::Value::from(format!("omni-room, split train, seed {seed}, {each_s} s of each person"))
-    };
+    }
     let mut card = toml::Table::new();
     card.insert("model".into(), args.plugin.clone().into());
     card.insert("quick".into(), args.quick.into());

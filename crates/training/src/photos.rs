@@ -203,10 +203,10 @@ pub fn to_unit_length(values: &mut [f32]) {
 
 /// Returns the mean brightness in each cell of a grid over an image, row by row.
 pub fn mean_cells(image: &GreyImage, columns: usize, rows: usize) -> Vec<f32> {
-    let part = |i: usize, of: usize, size: usize| {
+    fn part(i: usize, of: usize, size: usize) -> std::ops::Range<usize> {
         let from = i * size / of;
         from..((i + 1) * size / of).max(from + 1)
-    };
+    }
     let mean = |column: usize, row: usize| {
         let xs = part(column, columns, image.width());
         let ys = part(row, rows, image.height());

@@ -167,11 +167,11 @@ mod tests {
 
     #[test]
     fn every_suite_is_seen_by_both_cameras() {
-        let kinds = |kind: CameraKind| {
+        fn kinds(kind: CameraKind) -> std::collections::BTreeSet<String> {
             let scenes = (0..72).map(|number| scene(Split::Train, number, LOOK).unwrap());
             let abouts = scenes.filter(|s| s.camera.kind == kind).map(|scene| scene.about);
             abouts.collect::<std::collections::BTreeSet<String>>()
-        };
+        }
         assert_eq!(kinds(CameraKind::Rgbd), kinds(CameraKind::Stereo));
         assert_eq!(kinds(CameraKind::Rgbd).len(), 9, "eight suites and the rooms");
     }

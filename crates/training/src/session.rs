@@ -94,7 +94,7 @@ impl<'a> Session<'a> {
 
     fn context(&self) -> Context {
         let wheels = DiffDrive { half_separation_m: 0.167, slip: 0.02 };
-        Context { seed: self.args.seed, base_dir: PathBuf::from("."), wheels }
+        Context::new(self.args.seed, ".", wheels)
     }
 
     /// Builds the trainer of the plugin.

@@ -170,12 +170,12 @@ impl Draw {
             let known = |reading: &&SensorReading| is_live || reading.stamp_ns <= stamp_ns;
             let Some(reading) = readings.iter().rev().find(known) else { continue };
             let then = self.known_pose(reading.stamp_ns).odom_from_robot;
-            newest.push(ObstacleReading {
-                source: Arc::clone(name),
-                stamp: Stamp::from_nanos(reading.stamp_ns),
-                age_s: stamp_ns.saturating_sub(reading.stamp_ns) as f64 * 1e-9,
-                data: moved_along(&reading.data, &spatial_pose(&(here.inverse() * then))),
-            });
+            newest.push(ObstacleReading::new(
+                Arc::clone(name),
+                Stamp::from_nanos(reading.stamp_ns),
+                stamp_ns.saturating_sub(reading.stamp_ns) as f64 * 1e-9,
+                moved_along(&reading.data, &spatial_pose(&(here.inverse() * then))),
+            ));
         }
         (!newest.is_empty()).then(|| ObstacleReadings(newest.into()))
     }
@@ -236,7 +236,9 @@ impl Draw {
             return self.unwrapping.apply(panorama, &images).unwrap_or(images);
         }
         // Recorded depth has whole millimetres.
-        let round = |depth: Arc<DepthImage>| Arc::new(depth.map(|z| (1000.0 * z).round() * 0.001));
+        fn round(depth: Arc<DepthImage>) -> Arc<DepthImage> {
+            Arc::new(depth.map(|z| (1000.0 * z).round() * 0.001))
+        }
         Images { depth: images.depth.map(round), ..images }
     }
 

@@ -223,8 +223,7 @@ fn given_boxes(
     let mut boxes: BTreeMap<u32, Vec<ExternalDetection>> = BTreeMap::new();
     for row in mot::parse(text, file)? {
         let region = Rect::new(row.region.x, row.region.y, row.region.width, row.region.height);
-        let recorded =
-            ExternalDetection { region: Some(region), head: None, score: row.confidence };
+        let recorded = ExternalDetection::in_image(region, row.confidence);
         boxes.entry(row.frame).or_default().push(recorded);
     }
     Ok(boxes)

@@ -69,16 +69,10 @@ fn report(at: usize, tracks: &[Path<'_>], camera: &Camera) -> FrameReport {
         let position = Point3::new(x, y, 1.6);
         let person = Person { position, velocity: Vector2::zeros() };
         let region = camera.upper_body(&position);
-        Some(Track {
-            id: TrackId(*id),
-            estimate: Estimate { person, covariance: SMatrix::identity(), region },
-            seen: true,
-            occluded: false,
-            confirmed: true,
-            age: 9,
-            unseen_s: 0.0,
-            score: 1.0,
-        })
+        Some(
+            Track::new(TrackId(*id), Estimate::new(person, SMatrix::identity(), region), 1.0)
+                .with_age(9),
+        )
     };
     let mut report = FrameReport::new(at as u64 + 1, stamp(at));
     report.tracks = tracks.iter().filter_map(track).collect();

@@ -157,7 +157,7 @@ fn described(event: &Event) -> Option<EventData> {
         EventKind::FalseTrack { track } => {
             ("false track", None, Some(track), format!("track {track} begins where no person is"))
         }
-        EventKind::Found { .. } => return None,
+        _ => return None,
     };
     let i = event.frame.saturating_sub(1);
     Some(EventData { i, kind, track: track.and_then(|id| u32::try_from(id).ok()), person, text })

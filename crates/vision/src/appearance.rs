@@ -49,6 +49,7 @@ pub struct Appearance {
 
 /// Distances between two appearances, 0 to 1: of Hellinger, and for vectors 1 minus the cosine.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct AppearanceDifference {
     /// Colours of the upper body.
     pub torso: Option<f64>,
@@ -483,13 +484,13 @@ mod tests {
         #[test]
         fn what_is_before_or_behind_the_person_is_not_the_person() {
             // To the left of the middle there is a wall, and something near to the right.
-            let depth = |metres: f32| {
+            fn depth(metres: f32) -> DepthImage {
                 DepthImage::from_fn(320, 240, move |x, _| match x {
                     0..155 => 4.0,
                     155..165 => metres,
                     _ => 1.5,
                 })
-            };
+            }
             let looks = |metres| {
                 looks_of(
                     &person(0.0),

@@ -17,6 +17,7 @@ const PERSON_WIDTH_M: f64 = 0.63;
 /// Part of the body that a box encloses, and box that is tracked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum BoxedBody {
     /// The whole person, from head to feet; its upper-body square is tracked.
     Full,
@@ -296,7 +297,7 @@ mod tests {
         assert!(boxed(&settings, &Rect::new(-20.0, 100.0, 50.0, 170.0), None).is_some());
         assert_eq!(boxed(&settings, &Rect::new(f64::NAN, 100.0, 50.0, 170.0), None), None);
         let scanned = boxed(&settings, &Rect::new(300.0, 100.0, 50.0, 170.0), None).unwrap();
-        let odd = Detection { score: f64::NAN, ..scanned };
+        let odd = scanned.with_score(f64::NAN);
         assert!(!is_shown(&camera(), &odd), "a number that is none");
     }
 
@@ -309,21 +310,12 @@ mod tests {
     #[test]
     fn near_a_track_the_best_fit_comes_first() {
         let position = Point3::new(3.0, 0.0, 1.6);
-        let estimate = Estimate {
-            person: Person { position, velocity: Vector2::zeros() },
-            covariance: Matrix5::identity() * 0.01,
-            region: camera().upper_body(&Point3::new(3.0, 0.0, 1.5)),
-        };
-        let track = Track {
-            id: TrackId(1),
-            estimate,
-            seen: true,
-            occluded: false,
-            confirmed: true,
-            age: 3,
-            unseen_s: 0.0,
-            score: 2.0,
-        };
+        let estimate = Estimate::new(
+            Person { position, velocity: Vector2::zeros() },
+            Matrix5::identity() * 0.01,
+            camera().upper_body(&Point3::new(3.0, 0.0, 1.5)),
+        );
+        let track = Track::new(TrackId(1), estimate, 2.0).with_age(3);
         let near = |found: &[Detection]| -> Vec<f64> {
             let found = BoxSettings::default().near(&track, found.to_vec());
             found.iter().map(|detection| detection.position.x).collect()

@@ -10,9 +10,6 @@ use tagalong_geometry::Rect;
 
 use crate::Appearance;
 
-/// Ratio of height and width from which on a region is that of a whole person: an upper body is a
-/// square.
-const WHOLE_FROM: f64 = 1.5;
 /// Heights between which a standing person is assumed to be, m.
 const HEIGHTS_M: [f64; 2] = [1.0, 2.2];
 /// Part of a person that must be inside the image.
@@ -127,10 +124,6 @@ fn unit(vector: &[f32]) -> Option<Vector> {
     has_direction.then(|| vector.iter().map(|value| value / length).collect())
 }
 
-fn is_whole_person(region: &Rect) -> bool {
-    region.height >= WHOLE_FROM * region.width
-}
-
 /// Returns the height of a standing person with the head at a position, m.
 fn height_m(head: &Point3<f64>) -> f64 {
     let [least_m, most_m] = HEIGHTS_M;
@@ -140,12 +133,12 @@ fn height_m(head: &Point3<f64>) -> f64 {
 /// Returns the upper body of the person in a region, which is that of an upper body or of a whole
 /// person.
 fn upper_body(region: &Rect, head: &Point3<f64>) -> Rect {
-    if is_whole_person(region) { region.upper_body_of_standing(height_m(head)) } else { *region }
+    if region.is_whole_body() { region.upper_body_of_standing(height_m(head)) } else { *region }
 }
 
 /// Returns the box of a whole person inside the image; `None` if too little of it is there.
 fn person_box(region: &Rect, head: &Point3<f64>, frame: &Frame) -> Option<Rect> {
-    let whole = if is_whole_person(region) {
+    let whole = if region.is_whole_body() {
         *region
     } else {
         region.standing_of_upper_body(height_m(head))

@@ -11,6 +11,7 @@ use tagalong_math::{RandomSource, XorShift64};
 
 /// Settings of the ground estimation.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct GroundSettings {
     /// Minimum and maximum height of the camera, m.
     pub height_m: (f64, f64),

@@ -4,6 +4,7 @@ use tagalong_core::{DepthImage, GreyImage};
 
 /// Statistics of the readings of depth images.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct DepthQuality {
     /// Median reading, m.
     pub median_m: f64,
@@ -50,6 +51,7 @@ const WHITE: u8 = 250;
 
 /// Statistics of the exposure of an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Exposure {
     /// Fraction of the pixels that are black.
     pub black: f64,

@@ -11,6 +11,7 @@ use tagalong_core::{DepthImage, GreyImage};
 
 /// Settings of the comparison.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct OverlapSettings {
     /// Largest offset that is tried, to either side, pixels.
     pub reach_px: usize,
@@ -32,6 +33,7 @@ impl Default for OverlapSettings {
 
 /// Offset between depth and colour.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Offset {
     /// Columns and rows by which depth has to be moved to lie on colour.
     pub px: [i32; 2],

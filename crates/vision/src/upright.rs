@@ -23,6 +23,7 @@ struct End {
 }
 
 /// Intensities on the plane.
+#[non_exhaustive]
 pub struct UprightGrey {
     /// Intensities, row by row from the top, from left to right. Cells outside the image continue
     /// its border.

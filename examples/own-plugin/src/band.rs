@@ -65,14 +65,14 @@ impl OwnBand {
         let image = Some(ImageBox::upper_body(camera.upper_body(&position)));
         // The height is assumed, and people differ by a decimetre.
         let covariance = Matrix3::from_diagonal(&[0.01, 0.01, 0.01].into());
-        Some(Detection { image, ..Detection::new("own-band", position, covariance, 1.0) })
+        Some(Detection::new("own-band", position, covariance, 1.0).with_image(image))
     }
 }
 
 impl Detector for OwnBand {
     fn capabilities(&self) -> Capabilities {
         let inputs = Inputs::NONE.require(Input::Depth);
-        Capabilities { inputs, discovers: true, ..Capabilities::default() }
+        Capabilities::new(inputs).discovering()
     }
 
     fn detect(

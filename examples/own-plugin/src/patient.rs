@@ -27,7 +27,7 @@ impl TrackManager for OwnPatient {
     fn initiate(&mut self, _: TrackId, new: &Unassociated<'_>) -> Initiation {
         let log_odds = new.detection.score;
         if new.discovered && log_odds >= self.start_log_odds() {
-            Initiation::Start(TrackHealth { confirmed: true, log_odds })
+            Initiation::Start(TrackHealth::new(true, log_odds))
         } else {
             Initiation::Drop("score")
         }
@@ -36,6 +36,6 @@ impl TrackManager for OwnPatient {
     fn manage(&mut self, tracks: &[ObservedTrack<'_>]) -> TrackChanges {
         let unseen = tracks.iter().filter(|t| t.track.unseen_s > self.0.patience_s);
         let ends = unseen.map(|t| (t.track.id, "track: not seen")).collect();
-        TrackChanges { ends, ..TrackChanges::default() }
+        TrackChanges::new(Vec::new(), ends)
     }
 }

@@ -340,7 +340,7 @@ mod tests {
             let settings = PairCost { gate: 1e9, ..DEFAULT };
             let root = Matrix3::from_iterator(spread);
             let covariance = root * root.transpose() + Matrix3::identity() * 0.01;
-            let detection = Detection { covariance, ..detection_at(3.0, 0.0) };
+            let detection = detection_at(3.0, 0.0).with_covariance(covariance);
             let prior = SMatrix::<f64, 5, 5>::identity() * 0.04;
             let track = track(detection.position - nalgebra::Vector3::from(off), prior);
             let found = fit(&track, &detection, 0.1, &settings).unwrap();
@@ -377,7 +377,7 @@ mod tests {
     fn nobody_is_found_outside_the_gate_or_farther_than_they_can_have_walked() {
         let settings = PairCost { gate: 4.0, ..DEFAULT };
         let fits = |off_m: f64, variance: f64, dt_s: f64| {
-            let detection = Detection { covariance: Matrix3::zeros(), ..detection_at(3.0, 0.0) };
+            let detection = detection_at(3.0, 0.0).with_covariance(Matrix3::zeros());
             let at = detection.position - nalgebra::Vector3::new(off_m, 0.0, 0.0);
             let track = track(at, SMatrix::identity() * variance);
             fit(&track, &detection, dt_s, &settings).is_some()
@@ -433,7 +433,7 @@ mod tests {
             let region = Rect::new(x, 0.0, 10.0, 10.0);
             fit(
                 &track,
-                &Detection { image: Some(ImageBox::upper_body(region)), ..detection_at(9.0, 9.0) },
+                &detection_at(9.0, 9.0).with_image(ImageBox::upper_body(region)),
                 0.1,
                 &settings,
             )
@@ -443,10 +443,8 @@ mod tests {
         assert!((cost(5.0).unwrap() - 3.0_f64.ln()).abs() < 1e-12, "a third");
         assert_eq!(cost(5.5), None, "less than 0.3");
         let fit = |t: &Track, d: &Detection| fit(t, d, 0.1, &settings);
-        let detection = Detection {
-            image: Some(ImageBox::upper_body(Rect::new(5.0, 0.0, 10.0, 10.0))),
-            ..detection_at(3.0, 0.0)
-        };
+        let detection = detection_at(3.0, 0.0)
+            .with_image(ImageBox::upper_body(Rect::new(5.0, 0.0, 10.0, 10.0)));
         let given = |miss_factor: f64| {
             let tracks = std::slice::from_ref(&track);
             let seen = std::slice::from_ref(&detection);

@@ -45,10 +45,10 @@ pub fn register(registry: &mut Registry) {
     #[cfg(feature = "train")]
     registry.training(
         NAME,
-        tagalong_config::TrainingOffer {
-            data: tagalong_config::TrainingData::Candidates,
-            quick_settings: "[training]\nepochs = 2",
-        },
+        tagalong_config::TrainingOffer::new(
+            tagalong_config::TrainingData::Candidates,
+            "[training]\nepochs = 2",
+        ),
     );
     #[cfg(feature = "train")]
     registry.trainer(NAME, |config: Config, context| train::NetTrainer::new(config, context.seed));

@@ -46,10 +46,10 @@ pub fn register(registry: &mut Registry) {
     #[cfg(feature = "train")]
     registry.training(
         NAME,
-        tagalong_config::TrainingOffer {
-            data: tagalong_config::TrainingData::Candidates,
-            quick_settings: "[training]\ntrees = [25, 50]",
-        },
+        tagalong_config::TrainingOffer::new(
+            tagalong_config::TrainingData::Candidates,
+            "[training]\ntrees = [25, 50]",
+        ),
     );
     #[cfg(feature = "train")]
     registry.trainer(NAME, |config: Config, context| {

@@ -400,12 +400,7 @@ fn sighting(
 
 impl Detector for Compressive {
     fn capabilities(&self) -> Capabilities {
-        Capabilities {
-            inputs: Inputs::NONE.require(Input::Colour).accept(Input::Depth),
-            discovers: false,
-            tracks: true,
-            weighs: false,
-        }
+        Capabilities::new(Inputs::NONE.require(Input::Colour).accept(Input::Depth)).tracking()
     }
 
     fn detect(
@@ -449,16 +444,10 @@ mod tests {
         let position = Point3::new(3.0, 0.0, 1.35);
         let person = Person { position, velocity: Vector2::zeros() };
         let region = camera().upper_body(&position);
-        Track {
-            id: TrackId(1),
-            estimate: Estimate { person, covariance: SMatrix::identity(), region },
-            seen,
-            occluded,
-            confirmed: true,
-            age: 9,
-            unseen_s: 0.0,
-            score: 1.0,
-        }
+        Track::new(TrackId(1), Estimate::new(person, SMatrix::identity(), region), 1.0)
+            .with_seen(seen)
+            .with_occluded(occluded)
+            .with_age(9)
     }
 
     /// The weight of the past after a sighting so sure and so far aside, widths.

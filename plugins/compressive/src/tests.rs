@@ -73,17 +73,8 @@ impl World {
 fn track(head: Point3<f64>, seen: bool) -> Track {
     let person = Person { position: head, velocity: Vector2::zeros() };
     let covariance = SMatrix::identity() * 0.01;
-    let estimate = Estimate { person, covariance, region: camera().upper_body(&head) };
-    Track {
-        id: TrackId(3),
-        estimate,
-        seen,
-        occluded: false,
-        confirmed: true,
-        age: 5,
-        unseen_s: 0.0,
-        score: 2.0,
-    }
+    let estimate = Estimate::new(person, covariance, camera().upper_body(&head));
+    Track::new(TrackId(3), estimate, 2.0).with_seen(seen).with_age(5)
 }
 
 fn near(
@@ -269,12 +260,12 @@ fn who_is_too_small_or_beyond_the_image_is_not_learnt() {
 
 #[test]
 fn a_number_that_never_changed_does_not_decide_alone() {
-    let samples = |value: f32| {
+    fn samples(value: f32) -> Samples {
         let mut samples = Samples::default();
         samples.clear(1);
         (0..10).for_each(|_| samples.add(&[value]));
         samples
-    };
+    }
     let confidence = |min_sigma: f64, at: f32| {
         let mut appearance = Appearance::blank(1);
         appearance.learn(&samples(40.0), &samples(10.0), 0.0, min_sigma);
@@ -337,12 +328,12 @@ impl LearningRule for Everything {
 
 #[test]
 fn the_first_frame_counts_fully_and_in_the_public_code_by_a_seventh() {
-    let samples = |value: f32| {
+    fn samples(value: f32) -> Samples {
         let mut samples = Samples::default();
         samples.clear(1);
         (0..10).for_each(|_| samples.add(&[value]));
         samples
-    };
+    }
     let mean = |memory: f64| {
         let mut appearance = Appearance::blank(1);
         appearance.learn(&samples(40.0), &samples(10.0), memory, 1.0);

@@ -13,7 +13,7 @@
 //! let person = target(3.0, 1.0, Vector2::zeros()); // ahead, and to the left
 //! let tracks = std::slice::from_ref(&person);
 //! let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
-//! let scene = Scene { frame: &frame, target: Some(&person), tracks, wheels, max_speed_mps: 1.0 };
+//! let scene = Scene::new(&frame, tracks, wheels, 1.0).with_target(Some(&person));
 //! let twist = controller.command(&scene);
 //! assert!(twist.linear_mps > 0.0 && twist.angular_rps > 0.0);
 //! # Ok::<(), tagalong_core::Error>(())

@@ -131,7 +131,9 @@ fn place(strip: &Strip, picture: &Picture, (aside, down): (i64, i64), fits: &mut
 /// The best place, or the test that it failed.
 pub(crate) fn choose(config: &Config, fits: &[Placed]) -> TestResult<Placed> {
     let shown = || fits.iter().copied().filter(|at| at.fit.shown >= config.min_shown);
-    let by_correlation = |a: &Placed, b: &Placed| a.fit.correlation.total_cmp(&b.fit.correlation);
+    fn by_correlation(a: &Placed, b: &Placed) -> std::cmp::Ordering {
+        a.fit.correlation.total_cmp(&b.fit.correlation)
+    }
     let best = shown().max_by(by_correlation).ok_or("correlation: hidden")?;
     let off_m =
         |at: &Placed| CELL_M * ((at.aside - best.aside) as f64).hypot((at.down - best.down) as f64);
@@ -170,12 +172,7 @@ pub(crate) fn sighting(
 
 impl Detector for Correlation {
     fn capabilities(&self) -> Capabilities {
-        Capabilities {
-            inputs: Inputs::NONE.require(Input::Colour).require(Input::Depth),
-            discovers: false,
-            tracks: true,
-            weighs: false,
-        }
+        Capabilities::new(Inputs::NONE.require(Input::Colour).require(Input::Depth)).tracking()
     }
 
     fn detect(

@@ -83,17 +83,8 @@ impl World {
 fn track(head: Point3<f64>, seen: bool) -> Track {
     let person = Person { position: head, velocity: Vector2::zeros() };
     let covariance = SMatrix::identity() * 0.03;
-    let estimate = Estimate { person, covariance, region: camera().upper_body(&head) };
-    Track {
-        id: TrackId(3),
-        estimate,
-        seen,
-        occluded: false,
-        confirmed: true,
-        age: 5,
-        unseen_s: 0.0,
-        score: 2.0,
-    }
+    let estimate = Estimate::new(person, covariance, camera().upper_body(&head));
+    Track::new(TrackId(3), estimate, 2.0).with_seen(seen).with_age(5)
 }
 
 const HEAD: Point3<f64> = Point3::new(2.5, 0.0, 1.6);
@@ -191,7 +182,7 @@ fn each_person_is_remembered_as_long_as_the_track_of_that_person() {
     }
 
     let lost = track(HEAD, false);
-    let other = Track { id: TrackId(4), ..track(HEAD, false) };
+    let other = track(HEAD, false).with_id(TrackId(4));
     assert!(detected(std::slice::from_ref(&lost)) && detected(&[lost, other.clone()]));
     assert!(!detected(&[other]));
 }
@@ -375,7 +366,7 @@ fn who_is_not_in_plain_view_is_not_remembered() {
 
     assert!(learned(seen(), Config::default()));
     assert!(!learned(track(HEAD, false), Config::default()), "nobody is seen");
-    assert!(!learned(Track { occluded: true, ..seen() }, Config::default()));
+    assert!(!learned(seen().with_occluded(true), Config::default()));
     for width in [11.0, 1001.0] {
         let mut track = seen();
         track.estimate.region.width = width;

@@ -165,7 +165,7 @@ mod tests {
                 points.push(scanner + ray * 4.0);
             }
         }
-        PointCloud { scanner, points: points.into() }
+        PointCloud::new(scanner, points)
     }
 
     #[test]
@@ -177,7 +177,7 @@ mod tests {
         assert!((sum / zone_m2 - 1.0).abs() < 0.05, "{sum} {zone_m2}");
         // Half of the beams stand for the same surface.
         let half: Vec<Point3<f64>> = sphere().points.iter().copied().step_by(2).collect();
-        let half = Beams::new(&PointCloud { points: half.into(), ..sphere() });
+        let half = Beams::new(&PointCloud::new(sphere().scanner, half));
         let sum: f64 = half.points.iter().map(|(_, area_m2)| area_m2).sum();
         assert!((sum / zone_m2 - 1.0).abs() < 0.05, "{sum} {zone_m2}");
     }

@@ -42,15 +42,13 @@ impl DepthNet {
         let head = measured.unwrap_or(peak.head);
         let image = eyes.image_box(&head);
         let has_place = image.is_none_or(|image| image.rect.width > 0.0);
-        let detection = Detection {
-            image,
-            ..Detection::new(
-                NAME,
-                head,
-                Matrix3::from_diagonal(&sigmas.map(|sigma| sigma * sigma)),
-                self.model.log_odds(peak.logit).min(config.max_score),
-            )
-        };
+        let detection = Detection::new(
+            NAME,
+            head,
+            Matrix3::from_diagonal(&sigmas.map(|sigma| sigma * sigma)),
+            self.model.log_odds(peak.logit).min(config.max_score),
+        )
+        .with_image(image);
         // A head behind the camera has no region.
         (detection.is_sane() && has_place).then_some(detection)
     }
@@ -103,15 +101,11 @@ impl Eyes<'_> {
 
 impl Detector for DepthNet {
     fn capabilities(&self) -> Capabilities {
-        Capabilities {
-            inputs: Inputs::NONE.require(match self.config.source {
-                Source::Depth => Input::Depth,
-                Source::Points => Input::POINTS,
-            }),
-            discovers: true,
-            tracks: true,
-            weighs: false,
-        }
+        let input = match self.config.source {
+            Source::Depth => Input::Depth,
+            Source::Points => Input::POINTS,
+        };
+        Capabilities::new(Inputs::NONE.require(input)).discovering().tracking()
     }
 
     fn detect(

@@ -45,7 +45,7 @@ head = "[1, 3, 64, 64]: place of the head from the centre of the cell (x, y), an
 pub(crate) fn export(config: Config, context: &Context) -> Result<ExportedNetwork> {
     let model = context.model(&config.model, BUILT_IN, Model::from_text)?;
     let onnx = graph(&model).to_bytes();
-    Ok(ExportedNetwork { onnx, card: CARD.to_owned(), sample: sample(&model) })
+    Ok(ExportedNetwork::new(onnx, CARD.to_owned(), sample(&model)))
 }
 
 fn graph(model: &Model) -> OnnxGraph {

@@ -83,10 +83,10 @@ pub fn register(registry: &mut Registry) {
     #[cfg(feature = "train")]
     registry.training(
         NAME,
-        tagalong_config::TrainingOffer {
-            data: tagalong_config::TrainingData::Frames,
-            quick_settings: "[training]\nsteps = 40\nreal_steps = 10",
-        },
+        tagalong_config::TrainingOffer::new(
+            tagalong_config::TrainingData::Frames,
+            "[training]\nsteps = 40\nreal_steps = 10",
+        ),
     );
     #[cfg(feature = "train")]
     registry.trainer(NAME, |config: Config, context| {

@@ -68,7 +68,9 @@ pub(crate) fn peaks_of(views: &Views, passes: &[Pass], least: f64, separation_m:
 }
 
 fn is_highest(map: &FloorMap, pass: &Pass, [row, column]: [usize; 2]) -> bool {
-    let near = |at: usize| at.saturating_sub(REACH)..(at + REACH + 1).min(FloorMap::CELLS);
+    fn near(at: usize) -> std::ops::Range<usize> {
+        at.saturating_sub(REACH)..(at + REACH + 1).min(FloorMap::CELLS)
+    }
     let own = pass.logit(row, column);
     let is_higher =
         |y: usize, x: usize| map.in_view[y * FloorMap::CELLS + x] && pass.logit(y, x) > own;

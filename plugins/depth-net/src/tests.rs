@@ -5,7 +5,7 @@ use tagalong_config::{NamedTensor, Registry};
 use tagalong_conformance::{Suite, context, target};
 use tagalong_core::{
     Detection, Detector, EgoMotion, Error, Frame, Funnel, Images, Input, Inputs, Query, Sensors,
-    Stamp, Track, Verifier,
+    Stamp, Verifier,
 };
 use tagalong_geometry::Camera;
 use tagalong_network::{Limits, Network, RtenNetwork, Tensor};
@@ -187,7 +187,7 @@ fn the_verifier_believes_people_doubts_furniture_and_says_nothing_out_of_sight()
     let mut verifier = DepthNetVerifier::new(VerifierConfig::default(), &context()).unwrap();
     let candidate = found(&frame).remove(0);
     let mut log_odds = |position: Point3<f64>| {
-        verifier.log_odds(&frame, &Detection { position, ..candidate.clone() }).unwrap()
+        verifier.log_odds(&frame, &candidate.clone().with_position(position)).unwrap()
     };
     assert!(log_odds(truth[0].head_in_robot) > 1.0);
     let shelf = Point3::new(5.5, -1.0, 1.5);
@@ -201,7 +201,7 @@ fn near_a_confirmed_track_a_lower_score_suffices() {
     let config = Config { discover_score: 1e3, track_score: -1e3, ..Config::default() };
     let head = truth[0].head_in_robot;
     let followed = |confirmed: bool| {
-        let track = Track { confirmed, ..target(head.x, head.y, Vector2::zeros()) };
+        let track = target(head.x, head.y, Vector2::zeros()).with_confirmed(confirmed);
         let query = Query::Track(&track);
         detector(config.clone()).detect(&frame, &query, &mut Funnel::default()).unwrap().len()
     };
@@ -246,10 +246,8 @@ mod training {
     fn people(truth: &[Truth]) -> Vec<AnnotatedPerson> {
         truth
             .iter()
-            .map(|person| AnnotatedPerson {
-                head: person.head_in_robot,
-                counts: true,
-                visible: person.visible_fraction,
+            .map(|person| {
+                AnnotatedPerson::new(person.head_in_robot).with_visible(person.visible_fraction)
             })
             .collect()
     }
@@ -372,7 +370,9 @@ fn the_exported_network_has_the_same_answers() {
     for sample in [network.sample, crate::export::named(&model, &map)] {
         let (inputs, outputs): (Vec<_>, Vec<_>) =
             sample.into_iter().partition(|tensor| tensor.is_input);
-        let tensor = |tensor: NamedTensor| Tensor::new(tensor.shape, tensor.values).unwrap();
+        fn tensor(tensor: NamedTensor) -> Tensor {
+            Tensor::new(tensor.shape, tensor.values).unwrap()
+        }
         let inputs: Vec<Tensor> = inputs.into_iter().map(tensor).collect();
         let found = runtime.run(&inputs).unwrap();
         for (found, expected) in found.iter().zip(outputs) {

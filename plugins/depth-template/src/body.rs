@@ -54,7 +54,9 @@ impl Relief {
         let extents = cells
             .chunks(Self::SIZE)
             .map(|line| {
-                let is_body = |cell: &f64| !cell.is_nan();
+                fn is_body(cell: &f64) -> bool {
+                    !cell.is_nan()
+                }
                 let first = line.iter().position(is_body).unwrap_or(Self::SIZE);
                 first..line.iter().rposition(is_body).map_or(0, |last| last + 1)
             })

@@ -322,12 +322,7 @@ impl DepthTemplate {
 
 impl Detector for DepthTemplate {
     fn capabilities(&self) -> Capabilities {
-        Capabilities {
-            inputs: Inputs::NONE.require(Input::Depth),
-            discovers: true,
-            tracks: true,
-            weighs: true,
-        }
+        Capabilities::new(Inputs::NONE.require(Input::Depth)).discovering().tracking().weighing()
     }
 
     fn detect(
@@ -465,12 +460,12 @@ mod tests {
         }
 
         // 100 pixels a metre: a patch of 12 cm is 13 pixels wide.
-        let depth = |face: &dyn Fn(usize) -> f32| {
+        fn depth(face: &dyn Fn(usize) -> f32) -> DepthImage {
             DepthImage::from_fn(60, 60, |x, y| {
                 let inside = (24..=36).contains(&x) && (24..=36).contains(&y);
                 if inside { face(x) } else { 2.2 }
             })
-        };
+        }
         assert!((of(&depth(&|_| 2.1)) - 2.1).abs() < 1e-6);
         assert!((of(&depth(&|x| if x == 30 { 1.9 } else { 2.0 })) - 2.0).abs() < 1e-6);
         assert!((of(&depth(&turned)) - 2.1).abs() < 1e-6, "eight of thirteen columns");

@@ -127,21 +127,8 @@ fn somebody_already_found_is_not_found_again() {
 
 fn track_at(position: Point3<f64>, camera: &Camera) -> Track {
     let person = Person { position, velocity: Vector2::zeros() };
-    let estimate = Estimate {
-        person,
-        covariance: Matrix5::identity() * 0.02,
-        region: camera.upper_body(&position),
-    };
-    Track {
-        id: TrackId(1),
-        estimate,
-        seen: true,
-        occluded: false,
-        confirmed: true,
-        age: 5,
-        unseen_s: 0.0,
-        score: 1.0,
-    }
+    let estimate = Estimate::new(person, Matrix5::identity() * 0.02, camera.upper_body(&position));
+    Track::new(TrackId(1), estimate, 1.0).with_age(5)
 }
 
 #[test]
@@ -228,7 +215,7 @@ fn a_confirmed_track_is_judged_by_a_cost_of_its_own() {
     let followed = |confirmed: bool, discover_cost: f64, follow_cost: f64| {
         let config = DepthTemplateConfig { discover_cost, follow_cost, ..Default::default() };
         let mut detector = DepthTemplate::new(config).unwrap();
-        let track = Track { confirmed, ..track_at(head, &scene.camera) };
+        let track = track_at(head, &scene.camera).with_confirmed(confirmed);
         detector.detect(&scene, &Query::Track(&track), &mut Funnel::default()).unwrap().len()
     };
     assert_eq!([followed(true, 0.0, 10.0), followed(false, 0.0, 10.0)], [1, 0]);

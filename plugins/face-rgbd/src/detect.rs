@@ -91,27 +91,19 @@ impl FaceRgbd {
         let PointEstimate { position, covariance } =
             camera.locate(head_px, face.head_m(), config.sigma_place * side, face.sigma_m);
         let (slope, offset) = self.line;
-        let detection = Detection {
-            image: Some(ImageBox::upper_body(camera.upper_body(&position))),
-            position,
-            covariance,
-            // The logarithm needs a positive strength.
-            score: (slope * group.strength.max(1e-3).ln() + offset).min(config.max_score),
-            source: NAME,
-            joints: None,
-        };
+        // The logarithm needs a positive strength.
+        let score = (slope * group.strength.max(1e-3).ln() + offset).min(config.max_score);
+        let detection = Detection::new(NAME, position, covariance, score)
+            .with_image(ImageBox::upper_body(camera.upper_body(&position)));
         detection.is_sane().then_some(detection)
     }
 }
 
 impl Detector for FaceRgbd {
     fn capabilities(&self) -> Capabilities {
-        Capabilities {
-            inputs: Inputs::NONE.require(Input::Colour).accept(Input::Depth),
-            discovers: true,
-            tracks: true,
-            weighs: false,
-        }
+        Capabilities::new(Inputs::NONE.require(Input::Colour).accept(Input::Depth))
+            .discovering()
+            .tracking()
     }
 
     fn detect(
@@ -197,16 +189,7 @@ mod tests {
 
     fn track(region: Rect) -> Track {
         let person = Person { position: Point3::new(2.0, 0.0, 1.5), velocity: Vector2::zeros() };
-        Track {
-            id: TrackId(1),
-            estimate: Estimate { person, covariance: SMatrix::identity(), region },
-            seen: true,
-            occluded: false,
-            confirmed: true,
-            age: 9,
-            unseen_s: 0.0,
-            score: 1.0,
-        }
+        Track::new(TrackId(1), Estimate::new(person, SMatrix::identity(), region), 1.0).with_age(9)
     }
 
     /// Thresholds that are low enough for noise.

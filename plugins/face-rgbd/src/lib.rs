@@ -68,10 +68,10 @@ pub fn register(registry: &mut Registry) {
     #[cfg(feature = "train")]
     registry.training(
         TRAINER,
-        tagalong_config::TrainingOffer {
-            data: tagalong_config::TrainingData::Faces,
-            quick_settings: "[training]\nstages = 4\nfeatures = 200",
-        },
+        tagalong_config::TrainingOffer::new(
+            tagalong_config::TrainingData::Faces,
+            "[training]\nstages = 4\nfeatures = 200",
+        ),
     );
     #[cfg(feature = "train")]
     registry.trainer(TRAINER, |config: Config, context| {

@@ -284,7 +284,9 @@ mod tests {
     /// The cells in which windows of a size may have their centre.
     fn allowed(proposals: &Proposals) -> Vec<(usize, usize)> {
         fn window((x, y): &(usize, usize)) -> Rect {
-            let corner = |cell: usize| (cell * GRID_PX) as f64;
+            fn corner(cell: usize) -> f64 {
+                (cell * GRID_PX) as f64
+            }
             Rect::new(corner(*x), corner(*y), GRID_PX as f64, GRID_PX as f64)
         }
 

@@ -402,7 +402,6 @@ fn all_sizes_of_an_image_share_a_layout_and_other_images_and_steps_do_not() {
 mod training {
     use tagalong_config::{Example, Fitted, Trainer};
     use tagalong_conformance::patch::{candidate, frame};
-    use tagalong_core::Detection;
     use tagalong_geometry::ImageBox;
 
     use super::*;
@@ -450,7 +449,7 @@ mod training {
         let mut trainer = CascadeTrainer::new(config, begun, 3).unwrap();
         for group in 0..40 {
             for is_person in [true, false] {
-                let at = Detection { image: Some(ImageBox::upper_body(FACE)), ..candidate() };
+                let at = candidate().with_image(ImageBox::upper_body(FACE));
                 let frame = frame(picture(is_person, group));
                 trainer.add(&frame, &at, Example { is_person, group }).unwrap();
             }

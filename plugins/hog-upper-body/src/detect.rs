@@ -181,12 +181,8 @@ impl<'a> Proposer<'a> {
 impl Detector for HogUpperBody {
     fn capabilities(&self) -> Capabilities {
         let grey = Inputs::NONE.require(Input::Colour);
-        Capabilities {
-            inputs: if self.config.depth_proposals { grey.accept(Input::Depth) } else { grey },
-            discovers: true,
-            tracks: true,
-            weighs: false,
-        }
+        let inputs = if self.config.depth_proposals { grey.accept(Input::Depth) } else { grey };
+        Capabilities::new(inputs).discovering().tracking()
     }
 
     fn detect(
@@ -320,7 +316,7 @@ mod tests {
 
     fn detector(config: Config) -> HogUpperBody {
         let wheels = tagalong_core::DiffDrive { half_separation_m: 0.2, slip: 0.0 };
-        let context = Context { seed: 1, base_dir: ".".into(), wheels };
+        let context = Context::new(1, ".", wheels);
         HogUpperBody::new(config, &context).unwrap()
     }
 
@@ -389,16 +385,8 @@ mod tests {
         };
         let region = Rect::new(30.0, 30.0, 40.0, 40.0);
         let person = Person { position: Point3::new(2.0, 0.0, 1.3), velocity: Vector2::zeros() };
-        let track = Track {
-            id: TrackId(1),
-            estimate: Estimate { person, covariance: SMatrix::identity(), region },
-            seen: true,
-            occluded: false,
-            confirmed: true,
-            age: 9,
-            unseen_s: 0.0,
-            score: 1.0,
-        };
+        let track = Track::new(TrackId(1), Estimate::new(person, SMatrix::identity(), region), 1.0)
+            .with_age(9);
         assert!(dropped(config.clone(), None, None).1 > 1);
         assert_eq!(dropped(config, None, Some(&track)).1, 1);
     }

@@ -59,11 +59,11 @@ pub(crate) struct Linear {
 
 impl Linear {
     fn new(weights: &[f32], bias: f32) -> Self {
-        let padded = |row: &[f32]| {
+        fn padded(row: &[f32]) -> [f32; ROW] {
             let mut padded = [0.0; ROW];
             padded[..SIDE * BLOCK].copy_from_slice(row);
             padded
-        };
+        }
         let weights = weights.chunks_exact(SIDE * BLOCK).map(padded).collect();
         Self { blocks: Blocks::default(), weights, bias }
     }

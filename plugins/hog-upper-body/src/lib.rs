@@ -83,10 +83,10 @@ pub fn register(registry: &mut Registry) {
     #[cfg(feature = "train")]
     registry.training(
         NAME,
-        tagalong_config::TrainingOffer {
-            data: tagalong_config::TrainingData::Windows,
-            quick_settings: "[training]\nmining_rounds = 1\nepochs = 10",
-        },
+        tagalong_config::TrainingOffer::new(
+            tagalong_config::TrainingData::Windows,
+            "[training]\nmining_rounds = 1\nepochs = 10",
+        ),
     );
     #[cfg(feature = "train")]
     registry.trainer(NAME, |config: Config, context| {

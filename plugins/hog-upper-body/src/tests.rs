@@ -427,7 +427,7 @@ mod training {
     }
 
     fn at(square: Rect) -> Detection {
-        Detection { image: Some(ImageBox::upper_body(square)), ..candidate() }
+        candidate().with_image(ImageBox::upper_body(square))
     }
 
     fn trainer(kind: Kind) -> HogTrainer {

@@ -180,11 +180,11 @@ impl JointParticle {
         let velocity = Vector2::new(m[3], m[4]);
         let floor = m.fixed_rows::<2>(0) + velocity * self.ahead_s;
         let position = Point3::new(floor.x, floor.y, m[2]);
-        Estimate {
-            person: Person { position, velocity },
-            covariance: moments.covariance,
-            region: camera.upper_body(&position),
-        }
+        Estimate::new(
+            Person { position, velocity },
+            moments.covariance,
+            camera.upper_body(&position),
+        )
     }
 }
 
@@ -198,7 +198,7 @@ fn ids(group: &Group) -> BTreeSet<TrackId> {
 impl Filter for JointParticle {
     fn requirements(&self) -> FilterRequirements {
         let inputs = Inputs::NONE.accept(Input::Colour);
-        FilterRequirements { inputs, likelihood: true, searches: true, image_box: false }
+        FilterRequirements::new(inputs).with_likelihood().with_search()
     }
 
     fn start(&mut self, id: TrackId, detection: &Detection, _: &Camera) {
@@ -336,7 +336,7 @@ mod tests {
         let mut is_seen = |matched: &[Matched<'_>]| {
             filter.predict(&frame.motion, &frame.camera);
             let likelihood: Option<&dyn Likelihood> = Some(&flattering);
-            let evidence = Evidence { frame: &frame, matched, unmatched: &[], likelihood };
+            let evidence = Evidence::new(&frame, matched).with_likelihood(likelihood);
             filter.update(&evidence).unwrap().contains_key(&id)
         };
         let seen: Vec<bool> = (0..12).map(|_| is_seen(&[])).collect();
@@ -349,12 +349,12 @@ mod tests {
         let config = Config { method: Method::Kde, ..Config::default() };
         let mut filter = JointParticle::new(config.clone(), 1).unwrap();
         let frame = frame();
-        let farther = Detection { position: Point3::new(3.0, 0.1, 1.6), ..detection() };
+        let farther = detection().with_position(Point3::new(3.0, 0.1, 1.6));
         filter.start(TrackId(1), &detection(), &frame.camera);
         filter.start(TrackId(2), &farther, &frame.camera);
         filter.predict(&frame.motion, &frame.camera);
         let likelihood: Option<&dyn Likelihood> = Some(&Flattering(3.0));
-        let evidence = Evidence { frame: &frame, matched: &[], unmatched: &[], likelihood };
+        let evidence = Evidence::new(&frame, &[]).with_likelihood(likelihood);
         filter.update(&evidence).unwrap();
         let before = filter.estimates(&frame.camera);
         let shown = filter.visualise(&evidence).unwrap().unwrap();

@@ -85,11 +85,11 @@ mod tests {
 
     fn people(places: &[(f64, f64)]) -> BTreeMap<TrackId, Estimate> {
         fn estimate((x, y): &(f64, f64)) -> Estimate {
-            Estimate {
-                person: Person { position: Point3::new(*x, *y, 1.6), velocity: Vector2::zeros() },
-                covariance: Matrix5::identity(),
-                region: Rect::new(300.0 - 250.0 * y / x, 100.0, 150.0 / x, 150.0 / x),
-            }
+            Estimate::new(
+                Person { position: Point3::new(*x, *y, 1.6), velocity: Vector2::zeros() },
+                Matrix5::identity(),
+                Rect::new(300.0 - 250.0 * y / x, 100.0, 150.0 / x, 150.0 / x),
+            )
         }
 
         (1..).map(TrackId).zip(places.iter().map(estimate)).collect()

@@ -108,7 +108,7 @@ impl LaserLegs {
 impl Detector for LaserLegs {
     fn capabilities(&self) -> Capabilities {
         let inputs = Inputs::NONE.require(Input::Laser);
-        Capabilities { inputs, discovers: true, ..Capabilities::default() }
+        Capabilities::new(inputs).discovering()
     }
 
     fn detect(

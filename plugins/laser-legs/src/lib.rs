@@ -63,10 +63,10 @@ pub fn register(registry: &mut Registry) {
     #[cfg(feature = "train")]
     registry.training(
         NAME,
-        tagalong_config::TrainingOffer {
-            data: tagalong_config::TrainingData::LaserScans,
-            quick_settings: "[training]\ntrees = [10]\nfolds = 2\nevery_ray = []",
-        },
+        tagalong_config::TrainingOffer::new(
+            tagalong_config::TrainingData::LaserScans,
+            "[training]\ntrees = [10]\nfolds = 2\nevery_ray = []",
+        ),
     );
     #[cfg(feature = "train")]
     registry.trainer(NAME, |config: Config, context| train::LegTrainer::new(&config, context.seed));

@@ -134,7 +134,8 @@ mod tests {
     fn beams_of(increment_rad: f64, places: &[[f64; 2]]) -> Beams {
         let points: Vec<_> =
             places.iter().map(|at| nalgebra::Point3::new(at[0], at[1], 0.2)).collect();
-        let scan = LaserScan { increment_rad, ..LaserScan::of_points(points) };
+        let mut scan = LaserScan::of_points(points);
+        scan.increment_rad = increment_rad;
         Beams::new(&scan, 1)
     }
 

@@ -1,7 +1,6 @@
 //! Tests of segmentation, features, model and detector on made-up scans.
 
 use std::f64::consts::TAU;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point2, Point3};
@@ -36,20 +35,12 @@ fn scan(rays: u32, rounds: &Rounds, pose: Isometry3<f64>) -> LaserScan {
             numbers.push(ray);
         }
     }
-    LaserScan {
-        stamp: None,
-        robot_from_scanner: pose,
-        first_rad: -0.5 * TAU,
-        increment_rad: step,
-        points: points.into(),
-        rays: numbers.into(),
-        unread: Default::default(),
-    }
+    LaserScan::of_points(points).with_scanner(pose).with_rays(-0.5 * TAU, step, numbers)
 }
 
 fn context() -> Context {
     let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
-    Context { seed: 1, base_dir: PathBuf::from("."), wheels }
+    Context::new(1, ".", wheels)
 }
 
 fn detections(config: Config, scan: LaserScan) -> Vec<Detection> {
@@ -387,7 +378,8 @@ proptest! {
     ) {
         let points: Vec<Point3<f64>> =
             points.iter().map(|(x, y)| Point3::new(x.round() / 8.0, y.round() / 8.0, 0.2)).collect();
-        let scan = LaserScan { increment_rad, ..LaserScan::of_points(points) };
+        let mut scan = LaserScan::of_points(points);
+        scan.increment_rad = increment_rad;
         let found = detections(all(), scan);
         prop_assert!(found.iter().all(Detection::is_sane), "{found:?}");
     }

@@ -123,7 +123,9 @@ impl LegTrainer {
     fn figures(&self, trials: &[Trial], model: &Model) -> toml::Table {
         let legs = self.samples.iter().filter(|sample| sample.example.is_person).count();
         let simulated = self.samples.iter().filter(|sample| !sample.is_real).count();
-        let number = |n: usize| toml::Value::Integer(n as i64);
+        fn number(n: usize) -> toml::Value {
+            toml::Value::Integer(n as i64)
+        }
         let row = |trial: &Trial| {
             toml::Value::Table(toml::Table::from_iter([
                 ("trees".to_owned(), number(trial.trees)),
@@ -183,7 +185,7 @@ impl Trainer for LegTrainer {
         let model = Model { trees: self.grow(best.trees, |_| true), slope, offset };
         progress(1.0);
         let text = model.to_text().map_err(Error::Other)?;
-        Ok(Fitted { figures: self.figures(&trials, &model), model: text, ..Fitted::default() })
+        Ok(Fitted::new(text, self.figures(&trials, &model)))
     }
 }
 

@@ -121,12 +121,7 @@ impl OmniAppearance {
 
 impl Detector for OmniAppearance {
     fn capabilities(&self) -> Capabilities {
-        Capabilities {
-            inputs: Inputs::NONE.require(Input::Colour),
-            discovers: true,
-            tracks: true,
-            weighs: false,
-        }
+        Capabilities::new(Inputs::NONE.require(Input::Colour)).discovering().tracking()
     }
 
     fn detect(
@@ -238,16 +233,8 @@ mod tests {
         let mut covariance = SMatrix::<f64, 5, 5>::zeros();
         covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&spread);
         let person = Person { position: Point3::new(2.0, 1.0, 1.6), velocity: Vector2::zeros() };
-        let track = Track {
-            id: TrackId(1),
-            estimate: Estimate { person, covariance, region: Rect::default() },
-            seen: true,
-            occluded: false,
-            confirmed: true,
-            age: 3,
-            unseen_s: 0.0,
-            score: 1.0,
-        };
+        let track = Track::new(TrackId(1), Estimate::new(person, covariance, Rect::default()), 1.0)
+            .with_age(3);
         let reach = 3.0 * 0.2 + 0.3;
         let near = |way: Vector2<f64>| {
             let position = Point3::new(2.0 + way.x, 1.0 + way.y, 0.2);

@@ -75,10 +75,7 @@ pub fn register(registry: &mut Registry) {
     #[cfg(feature = "train")]
     registry.training(
         TRAINER,
-        tagalong_config::TrainingOffer {
-            data: tagalong_config::TrainingData::Panoramas,
-            quick_settings: "",
-        },
+        tagalong_config::TrainingOffer::new(tagalong_config::TrainingData::Panoramas, ""),
     );
     #[cfg(feature = "train")]
     registry.trainer(TRAINER, |config: Config, context| {

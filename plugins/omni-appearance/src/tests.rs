@@ -158,22 +158,13 @@ fn once_the_robot_has_moved_who_shows_no_change_is_furniture() {
 /// Returns a confirmed track at a place in the robot frame.
 fn track(place: Point2<f64>) -> Track {
     let position = Point3::new(place.x, place.y, 1.63);
-    let estimate = Estimate {
-        person: Person { position, velocity: Vector2::zeros() },
-        covariance: SMatrix::identity(),
-        region: Rect::default(),
-    };
+    let estimate = Estimate::new(
+        Person { position, velocity: Vector2::zeros() },
+        SMatrix::identity(),
+        Rect::default(),
+    );
     let id = TrackId(1);
-    Track {
-        id,
-        estimate,
-        seen: true,
-        occluded: false,
-        confirmed: true,
-        age: 9,
-        unseen_s: 0.0,
-        score: 1.0,
-    }
+    Track::new(id, estimate, 1.0).with_age(9)
 }
 
 #[test]

@@ -406,11 +406,10 @@ impl Trainer for DistanceTrainer {
         };
         let model = model(&self.collector.samples, geometry, &self.training, self.seed)?;
         progress(1.0);
-        Ok(Fitted {
-            model: model.to_text().map_err(Error::Other)?,
-            figures: figures(&self.collector, &self.training, self.seed)?,
-            ..Fitted::default()
-        })
+        Ok(Fitted::new(
+            model.to_text().map_err(Error::Other)?,
+            figures(&self.collector, &self.training, self.seed)?,
+        ))
     }
 }
 

@@ -119,12 +119,9 @@ fn load(runtime: Runtime, config: &Config, context: &Context) -> Result<Loaded> 
 
 impl Detector for Onnx {
     fn capabilities(&self) -> Capabilities {
-        Capabilities {
-            inputs: Inputs::NONE.require(Input::Colour).accept(Input::Depth),
-            discovers: true,
-            tracks: true,
-            weighs: false,
-        }
+        Capabilities::new(Inputs::NONE.require(Input::Colour).accept(Input::Depth))
+            .discovering()
+            .tracking()
     }
 
     fn detect(

@@ -28,7 +28,7 @@ fn models() -> PathBuf {
 
 fn context() -> Context {
     let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
-    Context { seed: 1, base_dir: models(), wheels }
+    Context::new(1, models(), wheels)
 }
 
 fn config(family: Family) -> Config {
@@ -146,17 +146,8 @@ fn track(confirmed: bool) -> Track {
     let found = detect(&mut detector(config(Family::Yolox)), &frame(1, 240)).remove(0);
     let person = Person { position: found.position, velocity: Vector2::zeros() };
     let region = found.rect().unwrap();
-    let estimate = Estimate { person, covariance: Matrix5::identity() * 0.01, region };
-    Track {
-        id: TrackId(1),
-        estimate,
-        seen: true,
-        occluded: false,
-        confirmed,
-        age: 3,
-        unseen_s: 0.0,
-        score: 2.0,
-    }
+    let estimate = Estimate::new(person, Matrix5::identity() * 0.01, region);
+    Track::new(TrackId(1), estimate, 2.0).with_confirmed(confirmed).with_age(3)
 }
 
 /// The scores of the networks rise from 0 to 1 around a brightness of 0.7.
@@ -222,7 +213,9 @@ fn a_config_without_a_model_says_so_in_the_funnel() {
 
 #[test]
 fn the_preparation_is_that_of_the_family_but_for_the_settings() {
-    let prepare = |config: Config| config.preparation(Family::NanoDet).unwrap();
+    fn prepare(config: Config) -> tagalong_network::Preparation {
+        config.preparation(Family::NanoDet).unwrap()
+    }
     assert_eq!(prepare(Config::default()), Family::NanoDet.preparation());
     let rgb = prepare(Config { colours: OrAuto::Chosen(Colours::Rgb), ..Config::default() });
     assert_eq!((rgb.colours, rgb.mean), (Colours::Rgb, [123.675, 116.28, 103.53]));

@@ -56,5 +56,5 @@ fn parse(line: &str) -> std::result::Result<(u64, ExternalDetection), String> {
     }
     // A box without a score counts as certain.
     let score = if fields.len() > 6 { number(6, "score")? } else { 1.0 };
-    Ok((frame as u64, ExternalDetection { region: Some(region), head: None, score }))
+    Ok((frame as u64, ExternalDetection::in_image(region, score)))
 }

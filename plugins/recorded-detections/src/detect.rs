@@ -60,7 +60,7 @@ impl RecordedDetections {
         if is_shown(&frame.camera, &detection) {
             return Some(detection);
         }
-        let seen_elsewhere = Detection { image: None, ..detection };
+        let seen_elsewhere = detection.with_image(None);
         (self.config.outside_image && seen_elsewhere.is_sane()).then_some(seen_elsewhere)
     }
 }
@@ -68,12 +68,8 @@ impl RecordedDetections {
 impl Detector for RecordedDetections {
     fn capabilities(&self) -> Capabilities {
         let depth = Inputs::NONE.accept(Input::Depth);
-        Capabilities {
-            inputs: if self.boxes.is_some() { depth } else { depth.require(Input::Detections) },
-            discovers: true,
-            tracks: true,
-            weighs: false,
-        }
+        let inputs = if self.boxes.is_some() { depth } else { depth.require(Input::Detections) };
+        Capabilities::new(inputs).discovering().tracking()
     }
 
     fn detect(

@@ -13,8 +13,8 @@
 //! use tagalong_recorded_detections::{Config, RecordedDetections};
 //!
 //! let mut detector = RecordedDetections::new(Config::default(), &context())?;
-//! let region = Some(Rect::new(8.0, 8.0, 48.0, 48.0));
-//! let recorded = vec![ExternalDetection { region, head: None, score: 0.9 }];
+//! let region = Rect::new(8.0, 8.0, 48.0, 48.0);
+//! let recorded = vec![ExternalDetection::in_image(region, 0.9)];
 //! let frame = patch::frame(patch::picture(true, 1)).with_recorded(Some(recorded));
 //! let all = Query::Discover { occupied: &[] };
 //! let found = detector.detect(&frame, &all, &mut Funnel::default())?;

@@ -26,7 +26,7 @@ fn frame(index: u64, depth_m: Option<f32>) -> Frame {
 
 fn context(folder: &std::path::Path) -> Context {
     let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
-    Context { seed: 1, base_dir: folder.to_owned(), wheels }
+    Context::new(1, folder.to_owned(), wheels)
 }
 
 fn with_boxes(boxes: BoxSettings) -> Config {
@@ -162,7 +162,7 @@ fn boxes_come_from_the_log_unless_a_file_has_them() {
 fn recorded_positions_of_the_log_are_taken_as_they_are() {
     let mut detector = RecordedDetections::new(Config::default(), &context(".".as_ref())).unwrap();
     let head = Point3::new(2.5, -0.3, 1.6);
-    let recorded = ExternalDetection { region: None, head: Some(head), score: 0.9 };
+    let recorded = ExternalDetection::at(head, 0.9);
     let frame = frame(1, None).with_recorded(Some(vec![recorded]));
     let found = detect(&mut detector, &frame);
     assert_eq!(found[0].position, head);
@@ -172,7 +172,7 @@ fn recorded_positions_of_the_log_are_taken_as_they_are() {
 #[test]
 fn a_position_outside_of_the_image_is_kept_without_a_box_if_the_settings_say_so() {
     let behind = Point3::new(-2.5, 0.3, 1.6);
-    let recorded = ExternalDetection { region: None, head: Some(behind), score: 0.9 };
+    let recorded = ExternalDetection::at(behind, 0.9);
     let frame = frame(1, None).with_recorded(Some(vec![recorded]));
     let of = |outside_image| {
         let config = Config { outside_image, ..Config::default() };
@@ -199,17 +199,8 @@ fn a_search_near_a_track_finds_the_right_box_first() {
     let mut detector = of_file(&text, Config::default()).unwrap();
     let person = Person { position: right, velocity: Vector2::zeros() };
     let region = camera().upper_body(&right);
-    let estimate = Estimate { person, covariance: Matrix5::identity() * 0.01, region };
-    let track = Track {
-        id: TrackId(1),
-        estimate,
-        seen: true,
-        occluded: false,
-        confirmed: true,
-        age: 3,
-        unseen_s: 0.0,
-        score: 2.0,
-    };
+    let estimate = Estimate::new(person, Matrix5::identity() * 0.01, region);
+    let track = Track::new(TrackId(1), estimate, 2.0).with_age(3);
     let near = Query::Track(&track);
     let found = detector.detect(&frame(2, None), &near, &mut Funnel::default()).unwrap();
     assert_eq!(found.len(), 1);
@@ -238,23 +229,14 @@ fn mistakes_are_named_by_file_and_line() {
 fn track_at(head: Point3<f64>) -> Track {
     let person = Person { position: head, velocity: Vector2::zeros() };
     let region = camera().upper_body(&head);
-    let estimate = Estimate { person, covariance: Matrix5::identity() * 0.01, region };
-    Track {
-        id: TrackId(1),
-        estimate,
-        seen: true,
-        occluded: false,
-        confirmed: true,
-        age: 3,
-        unseen_s: 0.0,
-        score: 2.0,
-    }
+    let estimate = Estimate::new(person, Matrix5::identity() * 0.01, region);
+    Track::new(TrackId(1), estimate, 2.0).with_age(3)
 }
 
 /// Returns true if a search near a track 3 m ahead finds a position from the log.
 fn finds_near(at: Point3<f64>, config: Config) -> bool {
     let mut detector = RecordedDetections::new(config, &context(".".as_ref())).unwrap();
-    let recorded = ExternalDetection { region: None, head: Some(at), score: 0.9 };
+    let recorded = ExternalDetection::at(at, 0.9);
     let frame = frame(1, None).with_recorded(Some(vec![recorded]));
     let track = track_at(Point3::new(3.0, 0.0, 1.6));
     !detector.detect(&frame, &Query::Track(&track), &mut Funnel::default()).unwrap().is_empty()
@@ -279,8 +261,7 @@ fn near_a_track_is_what_is_near_on_the_floor() {
 fn the_most_like_of_several_near_a_track_comes_first() {
     let mut detector = RecordedDetections::new(Config::default(), &context(".".as_ref())).unwrap();
     let heads = [3.5, 3.1, 3.3].map(|x| Point3::new(x, 0.0, 1.6));
-    let recorded =
-        heads.map(|head| ExternalDetection { region: None, head: Some(head), score: 0.9 });
+    let recorded = heads.map(|head| ExternalDetection::at(head, 0.9));
     let frame = frame(1, None).with_recorded(Some(recorded.to_vec()));
     let track = track_at(Point3::new(3.0, 0.0, 1.6));
     let found = detector.detect(&frame, &Query::Track(&track), &mut Funnel::default()).unwrap();

@@ -63,7 +63,9 @@ fn gradient(grey: &Patch, row: usize, column: usize) -> [f32; 2] {
 
 /// Returns the mean gradient strength of a cell and its neighbours.
 fn strength_around(histograms: &Patch, cell: usize) -> f32 {
-    let span = |k: usize| k.saturating_sub(1)..(k + 2).min(CELLS);
+    fn span(k: usize) -> std::ops::Range<usize> {
+        k.saturating_sub(1)..(k + 2).min(CELLS)
+    }
     let rows = span(cell / CELLS);
     let columns = span(cell % CELLS);
     let count = (rows.len() * columns.len()) as f32;

@@ -50,10 +50,10 @@ pub fn register(registry: &mut Registry) {
     #[cfg(feature = "train")]
     registry.training(
         NAME,
-        tagalong_config::TrainingOffer {
-            data: tagalong_config::TrainingData::Candidates,
-            quick_settings: "[training]\ngammas = [2.0, 8.0]\npenalties = [1.0, 10.0]\nmax_tried = 300",
-        },
+        tagalong_config::TrainingOffer::new(
+            tagalong_config::TrainingData::Candidates,
+            "[training]\ngammas = [2.0, 8.0]\npenalties = [1.0, 10.0]\nmax_tried = 300",
+        ),
     );
     #[cfg(feature = "train")]
     registry.trainer(NAME, |config: Config, context| {

@@ -9,7 +9,7 @@
 //! let mut manager = MOfN::new(Config::default())?;
 //! let mut detection = detection_at(3.0, 0.0);
 //! detection.score = 1.0; // the log-odds that this is a person
-//! let new = Unassociated { detection: &detection, detector_log_odds: 1.0, discovered: true };
+//! let new = Unassociated::new(&detection, 1.0, true);
 //! let Initiation::Start(health) = manager.initiate(TrackId(1), &new) else { unreachable!() };
 //! assert!(!health.confirmed, "one such detection is not enough");
 //! # Ok::<(), tagalong_core::Error>(())

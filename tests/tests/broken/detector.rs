@@ -94,7 +94,9 @@ impl Detector for Heads {
             "easy-going" => Inputs::NONE.accept(Input::Depth),
             _ => Inputs::NONE.require(Input::Depth),
         };
-        Capabilities { inputs, discovers: true, tracks: self.fault != "modest", weighs: true }
+        let mut capabilities = Capabilities::new(inputs).discovering().weighing();
+        capabilities.tracks = self.fault != "modest";
+        capabilities
     }
 
     fn detect(

@@ -81,7 +81,7 @@ impl PersonFilter for Kalman {
             _ => {}
         }
         let person = Person { position, velocity: Vector2::new(mean[3], mean[4]) };
-        Estimate { person, covariance, region: camera.upper_body(&position) }
+        Estimate::new(person, covariance, camera.upper_body(&position))
     }
 }
 
@@ -106,8 +106,12 @@ impl Filter for Faulty {
             return self.inner.update(evidence);
         }
         let in_order = (1..).zip(evidence.matched);
-        let matched: Vec<_> = in_order.map(|(id, m)| Matched { id: TrackId(id), ..*m }).collect();
-        self.inner.update(&Evidence { matched: &matched, ..*evidence })
+        let matched: Vec<_> =
+            in_order.map(|(id, m)| Matched::weighted(TrackId(id), m.detection, m.weight)).collect();
+        let swapped = Evidence::new(evidence.frame, &matched)
+            .with_unmatched(evidence.unmatched)
+            .with_likelihood(evidence.likelihood);
+        self.inner.update(&swapped)
     }
 
     fn estimates(&self, camera: &Camera) -> BTreeMap<TrackId, Estimate> {

@@ -177,7 +177,7 @@ mod tests {
         let frame = Frame::new(1, Stamp::default(), camera, motion, Images::default());
         let target = Some(person);
         let tracks = std::slice::from_ref(person);
-        let scene = Scene { frame: &frame, target, tracks, wheels: WHEELS, max_speed_mps: 0.9 };
+        let scene = Scene::new(&frame, tracks, WHEELS, 0.9).with_target(target);
         WHEELS.wheels(controller.command(&scene))
     }
 

@@ -65,7 +65,7 @@ mod tests {
     use super::*;
 
     fn track(seen: bool, occluded: bool) -> Track {
-        Track { seen, occluded, ..track_in(1, Rect::new(100.0, 80.0, 60.0, 60.0)) }
+        track_in(1, Rect::new(100.0, 80.0, 60.0, 60.0)).with_seen(seen).with_occluded(occluded)
     }
 
     #[test]

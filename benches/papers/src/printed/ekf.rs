@@ -83,7 +83,7 @@ impl PrintedEkf {
             return (&self.corrected, detection.clone());
         }
         let covariance = Matrix3::identity() * self.config.sigma_v_m.powi(2);
-        (&self.exact, Detection { covariance, ..detection.clone() })
+        (&self.exact, detection.clone().with_covariance(covariance))
     }
 }
 
@@ -121,7 +121,7 @@ impl PersonFilter for PrintedEkf {
         // A coordinate that was not measured is not counted, whatever the variance of all is.
         let variances = detection.covariance.diagonal();
         let dof = variances.iter().filter(|variance| **variance < UNMEASURED_M2).count();
-        Update { nis: update.nis.map(|(nis, _)| (nis, dof as u32)) }
+        Update::new(update.nis.map(|(nis, _)| (nis, dof as u32)))
     }
 
     fn merge(&self, alternatives: &[(f64, State)]) -> State {

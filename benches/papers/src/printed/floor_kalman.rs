@@ -123,11 +123,11 @@ impl PrintedFloorKalman {
         covariance[(2, 2)] = state.height_m2;
         covariance[(3, 3)] = INITIAL_SPEED_M2;
         covariance[(4, 4)] = INITIAL_SPEED_M2;
-        Estimate {
-            person: Person { position, velocity: turn * state.velocity },
+        Estimate::new(
+            Person { position, velocity: turn * state.velocity },
             covariance,
-            region: camera.upper_body(&position),
-        }
+            camera.upper_body(&position),
+        )
     }
 }
 
@@ -164,7 +164,7 @@ impl Filter for PrintedFloorKalman {
             if height_m2 < UNMEASURED_M2 {
                 state.correct_height(detection.position.z, height_m2);
             }
-            supported.insert(id, Update { nis: nis.map(|nis| (nis, 2)) });
+            supported.insert(id, Update::new(nis.map(|nis| (nis, 2))));
         }
         Ok(supported)
     }
@@ -220,8 +220,7 @@ mod tests {
             filter.predict(&motion, &camera());
             let seen = detection(2.0 + 0.2 * f64::from(step));
             let matched = [Matched::certain(ID, &seen)];
-            let evidence =
-                Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
+            let evidence = Evidence::new(&frame, &matched);
             filter.update(&evidence).unwrap();
         }
         filter.predict(&motion, &camera());

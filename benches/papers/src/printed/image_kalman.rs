@@ -11,7 +11,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_config::Registry;
 use tagalong_core::{
-    Detection, EgoMotion, Estimate, Evidence, Filter, FilterRequirements, Result, TrackId, Update,
+    Detection, EgoMotion, Estimate, Evidence, Filter, FilterRequirements, Inputs, Result, TrackId,
+    Update,
 };
 use tagalong_filters::image_kalman::State;
 use tagalong_geometry::Camera;
@@ -53,7 +54,7 @@ fn shift(state: &mut State, dt_s: f64) {
 
 impl Filter for PrintedImageKalman {
     fn requirements(&self) -> FilterRequirements {
-        FilterRequirements { image_box: true, ..FilterRequirements::default() }
+        FilterRequirements::new(Inputs::NONE).with_image_box()
     }
 
     fn start(&mut self, id: TrackId, detection: &Detection, camera: &Camera) {
@@ -134,8 +135,7 @@ mod tests {
             let frame =
                 Frame::new(1, Stamp::default(), Arc::clone(&camera), motion, Images::default());
             let matched = [Matched::certain(ID, seen)];
-            let evidence =
-                Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
+            let evidence = Evidence::new(&frame, &matched);
             filter.update(&evidence).unwrap();
         }
         filter.estimates(&camera)[&ID].clone()
@@ -149,7 +149,7 @@ mod tests {
         let sliding: Vec<Detection> = (0..60)
             .map(|i| {
                 let rect = Rect { x: first.x + 120.0 * DT_S * f64::from(i), ..first };
-                Detection { image: Some(ImageBox::upper_body(rect)), ..start.clone() }
+                start.clone().with_image(ImageBox::upper_body(rect))
             })
             .collect();
         let last = sliding[59].rect().unwrap().centre().x;

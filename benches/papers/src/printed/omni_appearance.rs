@@ -60,7 +60,7 @@ pub fn register(registry: &mut Registry) {
         detector,
     );
     let data = TrainingData::Panoramas;
-    registry.training(TRAINER, TrainingOffer { data, ..TrainingOffer::default() });
+    registry.training(TRAINER, TrainingOffer::new(data, ""));
     registry.trainer(TRAINER, |config: Config, context| {
         DistanceTrainer::new(config.printed(), context.seed)
     });

@@ -303,7 +303,7 @@ fn build<T>(
     let table = DeTable::parse(settings).map_err(other)?;
     let value = Spanned::new(table.span(), DeValue::Table(table.into_inner()));
     let wheels = DiffDrive { half_separation_m: 0.167, slip: 0.02 };
-    make(value, &Context { seed, base_dir: ".".into(), wheels }).map_err(|e| other(e.message))
+    make(value, &Context::new(seed, ".", wheels)).map_err(|e| other(e.message))
 }
 
 /// Returns an error of another crate as one of an experiment.

@@ -177,10 +177,10 @@ mod tests {
     fn stamps_that_no_image_has_are_told() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("walk.truth.jsonl");
-        let frame = |stamp_ns: u64| {
+        fn frame(stamp_ns: u64) -> String {
             let frame = tagalong_log::TruthFrame { stamp_ns, ..Default::default() };
             serde_json::to_string(&frame).unwrap() + "\n"
-        };
+        }
         let told = |stamps: &[u64]| {
             let text: String = stamps.iter().map(|stamp| frame(*stamp)).collect();
             std::fs::write(&path, text).unwrap();

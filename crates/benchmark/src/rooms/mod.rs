@@ -65,7 +65,7 @@ fn locations(args: &RoomsArgs) -> Result<Vec<Location>, Failure> {
         for log in &room.logs {
             let here = |failure: Failure| {
                 let span = Some(log.place.clone());
-                at(tagalong_config::ConfigError { message: failure.message, span })
+                at(tagalong_config::ConfigError::new(failure.message).or_at(span))
             };
             check_log_path(&log.path).map_err(here)?;
             let annotated = plan::with_truth(&log.path).map_err(here)?;
@@ -77,7 +77,7 @@ fn locations(args: &RoomsArgs) -> Result<Vec<Location>, Failure> {
                 return Ok((plugin, path));
             }
             let message = format!("there is no model {}", model.path.display());
-            Err(at(tagalong_config::ConfigError { message, span: Some(model.place) }))
+            Err(at(tagalong_config::ConfigError::new(message).or_at(Some(model.place))))
         });
         let models = models.collect::<Result<_, Failure>>()?;
         locations.push(Location {

@@ -93,7 +93,7 @@ impl Rooms {
             .collect::<Result<_, _>>()?;
         if rooms.len() < FEWEST {
             let message = format!("{} room: one is left out, so two are needed", rooms.len());
-            return Err(ConfigError { message, span: Some(whole) });
+            return Err(ConfigError::new(message).or_at(Some(whole)));
         }
         refuse_twins(&rooms)?;
         Ok(Self { rooms })
@@ -114,12 +114,12 @@ impl Room {
         let models = models.map(|(plugin, path)| (plugin, RoomFile::new(path, base_dir))).collect();
         if logs.is_empty() {
             let message = format!("room `{name}` has no log");
-            return Err(ConfigError { message, span: Some(place) });
+            return Err(ConfigError::new(message).or_at(Some(place)));
         }
         for file in entry.unjudged.keys() {
             if !logs.iter().any(|log| log.name() == *file.get_ref()) {
                 let message = format!("room `{name}` has no log called `{}`", file.get_ref());
-                return Err(ConfigError { message, span: Some(file.span()) });
+                return Err(ConfigError::new(message).or_at(Some(file.span())));
             }
         }
         let unjudged = entry.unjudged.into_iter().map(|(log, all)| (log.into_inner(), all));
@@ -155,7 +155,7 @@ fn refuse_twins(rooms: &[Room]) -> Result<(), ConfigError> {
                     "a log called `{}` is in room `{other}` already; each has one room",
                     log.name()
                 );
-                return Err(ConfigError { message, span: Some(log.place.clone()) });
+                return Err(ConfigError::new(message).or_at(Some(log.place.clone())));
             }
         }
     }

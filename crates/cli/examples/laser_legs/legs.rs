@@ -28,7 +28,7 @@ impl Default for Legs {
 impl Detector for Legs {
     fn capabilities(&self) -> Capabilities {
         let inputs = Inputs::NONE.require(Input::Laser);
-        Capabilities { inputs, discovers: true, ..Capabilities::default() }
+        Capabilities::new(inputs).discovering()
     }
 
     fn detect(

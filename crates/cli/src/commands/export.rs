@@ -41,7 +41,7 @@ impl Export<'_> {
         let table = DeTable::parse(&text).map_err(Failure::usage)?;
         let value = Spanned::new(table.span(), DeValue::Table(table.into_inner()));
         let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
-        let context = Context { seed: 0, base_dir: PathBuf::from("."), wheels };
+        let context = Context::new(0, ".", wheels);
         let network = registry.export(self.plugin, Some(value), &context);
         let network = network.map_err(|error| Failure::usage(error.message))?;
         write_file(self.file, &network.onnx)?;

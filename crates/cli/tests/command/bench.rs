@@ -180,7 +180,9 @@ fn the_scores_equal_those_of_eval() {
 fn jobs_shards_and_single_tasks_give_the_same_bytes() {
     let home = Home::new();
     home.config("panics", "config = { panic_after_frames = 4 }");
-    let arguments = |out: &'static str| ["--logs-dir", "logs", "--seeds", "2", "-o", out];
+    fn arguments(out: &'static str) -> [&'static str; 6] {
+        ["--logs-dir", "logs", "--seeds", "2", "-o", out]
+    }
     assert_eq!(code(&home.bench(&arguments("one"))), 1, "one pipeline fails");
     assert_eq!(code(&home.bench(&[&arguments("two")[..], &["--jobs", "2"]].concat())), 1);
     home.bench(&[&["plan"][..], &arguments("three")].concat());

@@ -408,7 +408,9 @@ fn mot17_figures_equal_those_of_trackeval() {
 fn truth_that_ends_far_before_the_sequence_is_noted() {
     let folder = tempfile::tempdir().unwrap();
     write(folder.path(), "seqinfo.ini", "name=long\nframeRate=10\nseqLength=600\n");
-    let row = |frame: usize| format!("{frame},1,0,0,40,90,1,-1,-1,-1\n");
+    fn row(frame: usize) -> String {
+        format!("{frame},1,0,0,40,90,1,-1,-1,-1\n")
+    }
     let tracks: String = (1..=600).map(row).collect();
     write(folder.path(), "tracks.txt", &tracks);
     for (last, is_noted) in [(20, true), (590, false)] {

@@ -44,7 +44,7 @@ fn registry() -> Registry {
 
 fn refusal(name: &str) -> String {
     let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
-    let context = Context { seed: 0, base_dir: PathBuf::new(), wheels };
+    let context = Context::new(0, PathBuf::new(), wheels);
     let built = registry().build_trainer(name, None, &context);
     built.map_or_else(|error| error.to_string(), |_| String::new())
 }
@@ -60,7 +60,7 @@ fn a_model_is_trained_as_its_plugin_says_and_else_as_is_usual_for_its_kind() {
     assert!(registry.has_trainers() && !Registry::default().has_trainers());
     let usual = registry.training_offer("counting");
     assert_eq!((usual.data, usual.quick_settings), (TrainingData::Candidates, ""));
-    let offer = TrainingOffer { data: TrainingData::LaserScans, quick_settings: "trees = 1" };
+    let offer = TrainingOffer::new(TrainingData::LaserScans, "trees = 1");
     registry.training("counting", offer);
     assert_eq!(registry.training_offer("counting"), offer);
 }
@@ -112,7 +112,7 @@ fn who_cannot_be_trained_is_answered_with_who_can() {
 
 fn context() -> Context {
     let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
-    Context { seed: 0, base_dir: PathBuf::new(), wheels }
+    Context::new(0, PathBuf::new(), wheels)
 }
 
 /// A plugin of each kind that does nothing.
@@ -279,7 +279,7 @@ fn a_model_is_trained_in_one_way() {
 
 #[test]
 fn a_model_is_the_built_in_one_or_that_of_the_file() {
-    let context = Context { base_dir: env!("CARGO_MANIFEST_DIR").into(), ..context() };
+    let context = Context::new(0, env!("CARGO_MANIFEST_DIR"), context().wheels);
     let first = |text: &str| text.lines().next().map(str::to_owned).ok_or("empty".to_owned());
     assert_eq!(context.model("", "built in", first), Ok("built in".into()));
     assert_eq!(context.model("Cargo.toml", "built in", first), Ok("[package]".into()));

@@ -29,6 +29,7 @@ pub struct Row {
 
 /// Rules by which a truth counts.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[non_exhaustive]
 pub enum Rules {
     /// MOT15: there are no classes, a zero confidence takes a truth out.
     Mot15,

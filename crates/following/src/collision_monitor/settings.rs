@@ -9,6 +9,7 @@ use crate::{CommandLimiterSettings, RobotSettings};
 /// Obstacles and people before which the robot slows down and stops.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct CollisionMonitorSettings {
     /// Sensors of obstacles: "sensed" (depth or laser; without them, or when one of them falls
     /// silent, nothing moves), or "none" for a controller that is to drive without eyes for
@@ -95,6 +96,7 @@ pub struct CollisionMonitorSettings {
 /// Meaning of a laser ray without a reflection.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum NoReturn {
     /// Nothing is known: a dark or shiny surface reflects nothing either.
     #[default]
@@ -106,6 +108,7 @@ pub enum NoReturn {
 /// Sensors of obstacles that a controller has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum ObstacleSource {
     /// Depth or laser. Without them nothing moves.
     #[default]

@@ -7,6 +7,7 @@ use tagalong_core::{Error, Result};
 /// are sources without a section.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct SourceSettings {
     /// Name of the source in reports; each has its own.
     pub name: String,

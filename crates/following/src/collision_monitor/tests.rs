@@ -299,12 +299,13 @@ fn what_is_nearer_than_a_scanner_measures_is_there() {
             .map(|ray| tagalong_core::UnreadRay { ray: *ray, reading: RayReading::TooNear(0.35) });
         let others: Vec<usize> =
             (0..rays.len()).filter(|at| !(160..200).contains(&rays[*at])).collect();
-        LaserScan {
-            points: others.iter().map(|at| points[*at]).collect(),
-            rays: others.iter().map(|at| rays[*at]).collect(),
-            unread: unread.collect(),
-            ..ahead
-        }
+        let unread: Vec<_> = unread.collect();
+        let points: Vec<_> = others.iter().map(|at| points[*at]).collect();
+        let rays: Vec<_> = others.iter().map(|at| rays[*at]).collect();
+        LaserScan::of_points(points)
+            .with_scanner(ahead.robot_from_scanner)
+            .with_rays(ahead.first_rad, ahead.increment_rad, rays)
+            .with_unread(unread)
     }
 
     let mut monitor = monitor();
@@ -363,7 +364,7 @@ fn a_person_is_kept_away_from_and_with_the_separation_off_is_a_thing() {
 fn the_followed_person_is_not_run_over() {
     fn before(x: f64, unseen_s: f64) -> f64 {
         let mut monitor = monitor();
-        let track = Track { unseen_s, seen: false, ..target(x, 0.0, Vector2::zeros()) };
+        let track = target(x, 0.0, Vector2::zeros()).with_unseen_s(unseen_s).with_seen(false);
         for index in 0..20 {
             let frame =
                 frame(index, EgoMotion::at_rest(0.1), Some(depth_at(index, 0.0, 0.0)), None);
@@ -387,7 +388,7 @@ fn with_source(kind: SourceKind) -> CollisionMonitorSettings {
 
 /// Returns a reading of the source `eye` with a stamp.
 fn reading(stamp: Stamp, data: ObstacleData) -> ObstacleReading {
-    ObstacleReading { source: "eye".into(), stamp, age_s: 0.02, data }
+    ObstacleReading::new("eye", stamp, 0.02, data)
 }
 
 /// Returns a monitor after two seconds with depth, and a source that delivers until frame `until`.

@@ -109,13 +109,8 @@ impl Orders {
     /// Returns the command in force as [`Orders::at`], in simulated time: `since_frame` is the time
     /// since the last frame that led to a command.
     pub fn after(&self, now: Stamp, since_frame: Duration) -> Command {
-        let stop = |reason| Command {
-            twist: Twist::STOP,
-            wheels: WheelSpeeds::STOP,
-            stamp: now,
-            valid_until: now.plus_seconds(self.valid_s),
-            reason,
-        };
+        let until = now.plus_seconds(self.valid_s);
+        let stop = |reason| Command::new(Twist::STOP, WheelSpeeds::STOP, now, until, reason);
         let is_young = since_frame.as_secs_f64() <= self.valid_s;
         match self.last {
             _ if self.fault.is_some() => stop(Reason::Fault),
@@ -208,7 +203,7 @@ impl CommandLimiter {
         let wheels = self.in_reach(motion.twist());
         let valid_until = wish.stamp.plus_seconds(self.settings.valid_s);
         let twist = self.wheels.twist(wheels);
-        let command = Command { twist, wheels, stamp: wish.stamp, valid_until, reason };
+        let command = Command::new(twist, wheels, wish.stamp, valid_until, reason);
         // Stops are remembered, too: the ramp of the next command starts from this one.
         self.response.add(&command);
         self.last = Some(command);

@@ -283,13 +283,13 @@ mod tests {
             let motion = EgoMotion { forward: drove(frame) * DT_S, ..EgoMotion::at_rest(DT_S) };
             responses.push(check.update(stamp(frame), &motion));
             let twist = Twist::new(told(frame), 0.0);
-            check.add(&Command {
+            check.add(&Command::new(
                 twist,
-                wheels: WheelSpeeds::STOP,
-                stamp: stamp(frame),
-                valid_until: stamp(frame).plus_seconds(0.25),
-                reason: Reason::Follow,
-            });
+                WheelSpeeds::STOP,
+                stamp(frame),
+                stamp(frame).plus_seconds(0.25),
+                Reason::Follow,
+            ));
         }
         responses
     }
@@ -357,13 +357,13 @@ mod tests {
         for frame in 0..40 {
             let motion = EgoMotion { forward: 0.5 * DT_S, ..EgoMotion::at_rest(DT_S) };
             check.update(stamp(frame), &motion);
-            let command = Command {
-                twist: Twist::new(0.5, 0.0),
-                wheels: WheelSpeeds::STOP,
-                stamp: stamp(frame),
-                valid_until: stamp(frame).plus_seconds(0.25),
-                reason: Reason::Follow,
-            };
+            let command = Command::new(
+                Twist::new(0.5, 0.0),
+                WheelSpeeds::STOP,
+                stamp(frame),
+                stamp(frame).plus_seconds(0.25),
+                Reason::Follow,
+            );
             check.add(&command);
         }
         let paused = check.update(stamp(52), &EgoMotion::at_rest(12.0 * DT_S));

@@ -10,6 +10,7 @@ use crate::collision_monitor::Braking;
 /// safety function in the sense of the standards.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct CommandLimiterSettings {
     /// Largest acceleration, m/s².
     #[schemars(range(min = 0.05, max = 1.0))]

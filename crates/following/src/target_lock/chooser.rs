@@ -22,6 +22,7 @@ const CROSSES_MPS: f64 = 0.4;
 /// Rule by which a target is chosen while there is none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum ChoiceRule {
     /// The nearest person in front.
     #[default]
@@ -233,7 +234,7 @@ mod tests {
 
     fn track(id: u32, x: f64, y: f64, speed_mps: f64) -> Track {
         let track = target(x, y, Vector2::new(-speed_mps, 0.0));
-        Track { id: TrackId(id), seen: true, confirmed: true, occluded: false, ..track }
+        track.with_id(TrackId(id)).with_seen(true).with_confirmed(true).with_occluded(false)
     }
 
     /// Returns the index of the frame in which a track is chosen, and its number.
@@ -270,9 +271,9 @@ mod tests {
         assert_eq!(chosen(stands), None, "stood there from the start");
         let passes = (0..60).map(|i| vec![track(1, 4.0 - 0.1 * f64::from(i), 0.6, 1.0)]);
         assert_eq!(chosen(passes), None, "walks past the robot");
-        let unseen = walk_up(1, 1.5, 0.0).map(|track| vec![Track { seen: false, ..track }]);
+        let unseen = walk_up(1, 1.5, 0.0).map(|track| vec![track.with_seen(false)]);
         assert_eq!(chosen(unseen), None, "predicted only");
-        let noise = walk_up(1, 1.5, 0.0).map(|track| vec![Track { confirmed: false, ..track }]);
+        let noise = walk_up(1, 1.5, 0.0).map(|track| vec![track.with_confirmed(false)]);
         assert_eq!(chosen(noise), None, "not confirmed");
     }
 
@@ -346,7 +347,7 @@ mod tests {
         let settings = TargetSettings { reconsider_s: 5.0, ..TargetSettings::default() };
         let chosen = track(1, 2.5, 0.0, 0.0);
         let instead = |seen: bool| {
-            let tracks = [chosen.clone(), Track { seen, ..track(2, 1.5, 0.0, 0.0) }];
+            let tracks = [chosen.clone(), track(2, 1.5, 0.0, 0.0).with_seen(seen)];
             let nearer = Chooser::default().reconsider(&settings, &chosen, &tracks, DT_S);
             nearer.map(|track| track.id.0)
         };

@@ -84,6 +84,7 @@ impl LockState {
 
 /// Report of the target lock for one frame.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct LockReport {
     /// State of the lock.
     pub state: LockState,

@@ -7,6 +7,7 @@ use super::ChoiceRule;
 /// Choice of the target, doubts about its identity, and the search for a lost person.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct TargetSettings {
     /// Number of the track to follow; one that `choose` picks if left out.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -192,6 +193,7 @@ impl Default for LooksSettings {
 /// still when the person is lost.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct SearchSettings {
     /// Turn towards where the person went, and drive to the last seen position.
     pub enabled: bool,

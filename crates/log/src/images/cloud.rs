@@ -21,6 +21,7 @@ const SAMPLES_A_SIDE: usize = 160;
 
 /// Axes of the points of a cloud.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum CloudAxes {
     /// Z ahead, X to the right, Y down: an optical frame.
     Optical,
@@ -30,6 +31,7 @@ pub enum CloudAxes {
 
 /// Camera of a cloud whose points lie in rows and columns, measured by the points.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct CloudCamera {
     /// Axes of the points.
     pub axes: CloudAxes,

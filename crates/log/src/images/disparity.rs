@@ -17,6 +17,7 @@ const SIXTEENTH_PX: f64 = 1.0 / 16.0;
 
 /// Depth from disparities.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct DepthFromDisparity {
     /// Depth, m.
     pub depth: DepthImage,
@@ -26,6 +27,7 @@ pub struct DepthFromDisparity {
 
 /// Focal length and baseline of a stereo camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct StereoGeometry {
     /// Focal length along columns, pixels.
     pub focal_px: f64,

@@ -148,6 +148,7 @@ impl ImageError {
 
 /// Content of an encoding or format, as far as its name shows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Content {
     /// Colour or intensity.
     Picture,

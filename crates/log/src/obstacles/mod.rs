@@ -32,6 +32,7 @@ pub struct ObstacleTopic {
 
 /// Kind of a source of obstacles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ObstacleKind {
     /// `sensor_msgs/LaserScan`.
     Scan,

@@ -169,7 +169,7 @@ impl ObstacleReader {
         };
         // A reading of after the frame is as new as it can be.
         let age_s = moment.stamp.seconds_since(stamp).max(0.0);
-        Some(ObstacleReading { source: Arc::clone(&self.name), stamp, age_s, data })
+        Some(ObstacleReading::new(Arc::clone(&self.name), stamp, age_s, data))
     }
 
     /// Counts a frame for which the source has readings of far later times alone.

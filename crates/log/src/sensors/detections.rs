@@ -120,7 +120,7 @@ impl SensorReader for Recorded {
             return sensors;
         };
         let Some(detections) = self.detections(message, moment, tally) else { return sensors };
-        sensors.with(ExternalDetections { detections, camera: Arc::clone(moment.camera) })
+        sensors.with(ExternalDetections::new(detections, Arc::clone(moment.camera)))
     }
 
     fn is_ready(&self, stamp: Stamp, tolerance_s: f64) -> bool {
@@ -301,7 +301,7 @@ impl Recorded {
                 continue;
             }
             self.boxes.take(&region, *score, moment.camera);
-            found.push(ExternalDetection { region: Some(region), head: None, score: *score });
+            found.push(ExternalDetection::in_image(region, *score));
         }
         found
     }
@@ -402,7 +402,7 @@ fn in_space(
     for (detection, score) in people {
         match head_of(detection, &robot_from_message) {
             Some(head) => {
-                found.push(ExternalDetection { region: None, head: Some(head), score: *score });
+                found.push(ExternalDetection::at(head, *score));
             }
             None => lose_box(moment.topic, tally),
         }

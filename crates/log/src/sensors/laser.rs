@@ -110,15 +110,11 @@ pub(crate) fn seen_from(
             (ray, Point3::new(now.x, now.y, then.z))
         })
         .unzip();
-    Scan {
-        stamp: Some(scan.header.stamp()),
-        robot_from_scanner: spatial_pose(robot_from_then) * robot_from_laser,
-        first_rad: f64::from(scan.angle_min),
-        increment_rad: f64::from(scan.angle_increment),
-        points: points.into(),
-        rays: rays.into(),
-        unread: unread(scan).collect(),
-    }
+    Scan::of_points(points)
+        .with_stamp(scan.header.stamp())
+        .with_scanner(spatial_pose(robot_from_then) * robot_from_laser)
+        .with_rays(f64::from(scan.angle_min), f64::from(scan.angle_increment), rays)
+        .with_unread(unread(scan).collect::<Vec<_>>())
 }
 
 /// Returns the valid ranges of the scanner, m.

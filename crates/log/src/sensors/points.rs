@@ -79,10 +79,10 @@ pub(crate) fn cloud_in_robot(
         points_of_cloud(&cloud, &Limits::default()).map_err(|error| error.to_string())
     });
     match points {
-        Ok(points) => Some(Cloud {
-            scanner: robot_from_lidar * Point3::origin(),
-            points: points.iter().map(|point| robot_from_lidar * point).collect(),
-        }),
+        Ok(points) => {
+            let points: Vec<_> = points.iter().map(|point| robot_from_lidar * point).collect();
+            Some(Cloud::new(robot_from_lidar * Point3::origin(), points))
+        }
         Err(why) => {
             tally.lose("clouds_invalid", || format!("{topic}: points cannot be used: {why}"));
             None

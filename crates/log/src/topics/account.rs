@@ -29,6 +29,7 @@ pub struct TopicUse {
 /// Account of all images, scans, detections and odometry of a log.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(transparent)]
+#[non_exhaustive]
 pub struct InputAccount {
     /// Used topics first, each kind in the order of names.
     pub topics: Vec<TopicUse>,

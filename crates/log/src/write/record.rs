@@ -8,6 +8,7 @@ use tagalong_geometry::{Camera, Rect};
 /// Settings of the output, `[output]` of a config.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct OutputSettings {
     /// Time for which confirmed tracks stay in `tracks.csv` while unseen, s. With 0 a track is
     /// written only in frames in which the person was seen.

@@ -14,15 +14,6 @@ pub(super) fn track(id: u32) -> Track {
     let person =
         Person { position: Point3::new(3.0, 0.5, 1.6), velocity: Vector2::new(0.5, -0.25) };
     let region = camera().upper_body(&person.position);
-    let estimate = Estimate { person, covariance: SMatrix::<f64, 5, 5>::identity() * 0.01, region };
-    Track {
-        id: TrackId(id),
-        estimate,
-        seen: true,
-        occluded: false,
-        confirmed: true,
-        age: 9,
-        unseen_s: 0.0,
-        score: 2.0,
-    }
+    let estimate = Estimate::new(person, SMatrix::<f64, 5, 5>::identity() * 0.01, region);
+    Track::new(TrackId(id), estimate, 2.0).with_age(9)
 }

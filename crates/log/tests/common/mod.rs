@@ -12,8 +12,8 @@ use serde::Serialize;
 use tagalong_core::Stamp;
 use tagalong_geometry::{Camera, Distortion, Pinhole};
 use tagalong_log::msgs::{
-    CameraInfo, Header, Image, Message, Odometry, Pose, TFMessage, Transform, TransformStamped,
-    encode,
+    CameraInfo, Header, Image, LaserScan, Message, Odometry, Pose, TFMessage, Transform,
+    TransformStamped, encode,
 };
 use tagalong_log::{FrameSource, InputSettings, Inputs, Limits, LogError};
 
@@ -25,6 +25,20 @@ pub fn started() -> LogWriter {
     log.info(INFO, "colour", &camera(16, 12, 14.0));
     log.fixed("base_link", "colour", &level_pose());
     log
+}
+
+/// Returns a scan of a wall at 2 m, half a radian to each side.
+pub fn sweep(stamp: Stamp, frame: &str) -> LaserScan {
+    LaserScan {
+        header: Header::new(stamp, frame),
+        angle_min: -0.5,
+        angle_max: 0.5,
+        angle_increment: 0.01,
+        range_min: 0.1,
+        range_max: 10.0,
+        ranges: vec![2.0; 101],
+        ..LaserScan::default()
+    }
 }
 
 pub fn at(seconds: f64) -> Stamp {

@@ -30,7 +30,7 @@ pub(super) fn check(
             let message = format!("`{section}.{key}` {why}");
             // A default may contradict a setting of the robot.
             let span = place(root, section, &key).or_else(|| root.get("robot").map(Spanned::span));
-            return Err(ConfigError { message, span });
+            return Err(ConfigError::new(message).or_at(span));
         }
     }
     // TOML knows no larger numbers, and the seed is written into the reports.

@@ -70,7 +70,7 @@ impl Document {
         let mut extends = parse(text, 0)?.remove(EXTENDS).map(name_of);
         while let Some((name, span)) = &extends {
             let base = base_at(&folder, name.as_deref(), end, &document.bases, read_base)
-                .map_err(|message| ConfigError { message, span: Some(span.clone()) });
+                .map_err(|message| ConfigError::new(message).or_at(Some(span.clone())));
             let base = base.map_err(|error| document.locate(error))?;
             end = base.padded.len();
             base.folder().clone_into(&mut folder);
@@ -85,7 +85,7 @@ impl Document {
     ///
     /// # Errors
     /// None for a config that was read.
-    pub fn root(&self) -> Result<DeTable<'_>, ConfigError> {
+    pub(crate) fn root(&self) -> Result<DeTable<'_>, ConfigError> {
         // From the far end: each config knows then which plugins it inherits.
         let mut inherited = DeTable::new();
         for base in self.bases.iter().rev() {
@@ -126,7 +126,7 @@ impl Document {
         };
         let shift = |at: usize| at.saturating_sub(base.start);
         let span = Range { start: shift(span.start), end: shift(span.end) };
-        let there = ConfigError { message: error.message, span: Some(span) };
+        let there = ConfigError::new(error.message).or_at(Some(span));
         let shown = there.render(&base.path.display().to_string(), base.text());
         ConfigError::new(format!("it extends {}, where:\n{shown}", base.path.display()))
     }
@@ -172,7 +172,7 @@ fn parse(padded: &str, start: usize) -> Result<DeTable<'_>, ConfigError> {
     for value in root.values() {
         if depth(value.get_ref()) >= MAX_DEPTH {
             let message = format!("nested deeper than {MAX_DEPTH} levels");
-            return Err(ConfigError { message, span: Some(value.span()) });
+            return Err(ConfigError::new(message).or_at(Some(value.span())));
         }
     }
     Ok(root)

@@ -65,14 +65,14 @@ pub(super) fn declared_inputs(
                  `without`, or `{name}` from the config",
                 input.name()
             );
-            return Err(ConfigError { message, span: without_span });
+            return Err(ConfigError::new(message).or_at(without_span));
         }
     }
     if has_controller && lacks_eyes(settings) {
         let message = "the controller has no sensor of obstacles, for `without` leaves out depth and \
                        laser: remove one of them from `without`, or, for a robot that is to drive \
                        without eyes, set `obstacles = \"none\"` in [collision_monitor]";
-        return Err(ConfigError { message: message.into(), span: without_span });
+        return Err(ConfigError::new(message).or_at(without_span));
     }
     if has_controller && guesses_motion(settings) {
         let message = "`[odometry] source = \"image\"` is a guess by which no robot may drive: \

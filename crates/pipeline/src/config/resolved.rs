@@ -87,7 +87,7 @@ impl ResolvedConfig {
             let first = root.get(parts.next()?)?;
             parts.try_fold(first, |value, part| value.get_ref().as_table()?.get(part))?.span()
         };
-        let error = ConfigError { message: message.to_owned(), span: Some(span) };
+        let error = ConfigError::new(message.to_owned()).or_at(Some(span));
         Some(self.source.mistake(&self.document.locate(error)))
     }
 }

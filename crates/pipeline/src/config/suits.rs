@@ -9,6 +9,7 @@ pub(super) const TABLE: &str = "suits";
 /// `tagalong doctor` warns of them, too.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct Suits {
     /// Lowest and highest camera above the floor, m.
     pub camera_height_m: Option<[f64; 2]>,
@@ -59,7 +60,7 @@ pub(super) fn read(table: Option<Value<'_>>) -> Result<Suits, ConfigError> {
     for (key, range) in ranges {
         if range.is_some_and(|[low, high]| low.is_nan() || high.is_nan() || low > high) {
             let message = format!("`{key}` is the lowest and the highest value, in this order");
-            return Err(ConfigError { message, span: place });
+            return Err(ConfigError::new(message).or_at(place));
         }
     }
     Ok(suits)

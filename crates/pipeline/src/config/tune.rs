@@ -70,7 +70,7 @@ impl Pipeline {
                 let changed = config.source.with_text(config.with_values(&[(key, value)])?);
                 if let Err(error) = Self::from_source(&changed, registry, &options) {
                     let message = format!("`{key}` = {value} is not allowed: {}", error.message);
-                    return Err(ConfigError { message, span: Some(place.clone()) });
+                    return Err(ConfigError::new(message).or_at(Some(place.clone())));
                 }
             }
         }
@@ -174,7 +174,7 @@ fn tunable(named: Named, value: Value<'_>, leaves: &[Leaf<'_>]) -> Result<Tunabl
         let remedy = "name a single setting that has a default or stands in the config";
         let message =
             format!("nothing to tune is called `{key}`{}; {remedy}", hint.unwrap_or_default());
-        return Err(ConfigError { message, span: Some(place) });
+        return Err(ConfigError::new(message).or_at(Some(place)));
     };
     let whole = value.span();
     let (values, places): (Vec<_>, Vec<_>) = match value.into_inner() {
@@ -187,7 +187,7 @@ fn tunable(named: Named, value: Value<'_>, leaves: &[Leaf<'_>]) -> Result<Tunabl
         count if count > MAX_VALUES => format!("has {count} values; at most {MAX_VALUES}"),
         _ => return Ok(Tunable { key, now: (*now).clone(), values, places }),
     };
-    Err(ConfigError { message: format!("`{key}` {mistake}"), span: Some(whole) })
+    Err(ConfigError::new(format!("`{key}` {mistake}")).or_at(Some(whole)))
 }
 
 type Values = (Vec<toml::Value>, Vec<Range<usize>>);
@@ -201,7 +201,7 @@ fn listed(key: &str, items: DeArray<'_>, now: &toml::Value) -> Result<Values, Co
         let value = as_now(key, value, now).map_err(|error| error.or_at(Some(place.clone())))?;
         if values.contains(&value) {
             let message = format!("`{key}` lists {value} twice");
-            return Err(ConfigError { message, span: Some(place) });
+            return Err(ConfigError::new(message).or_at(Some(place)));
         }
         values.push(value);
         places.push(place);
@@ -215,7 +215,7 @@ fn spread(
     now: &toml::Value,
 ) -> Result<Values, ConfigError> {
     let span = table.span();
-    let at = |message: String| ConfigError { message, span: Some(span.clone()) };
+    let at = |message: String| ConfigError::new(message).or_at(Some(span.clone()));
     let table = toml::Spanned::new(span.clone(), DeValue::Table(table.into_inner()));
     let Spread { between: [low, high], steps } =
         Spread::deserialize(toml::de::ValueDeserializer::from(table))?;

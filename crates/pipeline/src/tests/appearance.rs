@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use tagalong_core::{Detection, Frame, Images, RgbImage};
+use tagalong_core::{Frame, Images, RgbImage};
 
 use super::doubles::{PLAIN, World, frame, person};
 use crate::{FrameReport, Pipeline};
@@ -79,7 +79,7 @@ fn a_person_who_returns_is_known_by_the_vector() {
 }
 
 fn ride(appearance: &str) -> Vec<FrameReport> {
-    let world = World::of((0..30).map(|_| vec![Detection { score: 5.0, ..person(3.0, 0.0) }]));
+    let world = World::of((0..30).map(|_| vec![person(3.0, 0.0).with_score(5.0)]));
     let config = config(appearance, "[controller]\nplugin = 'drive'");
     let mut pipeline = world.pipeline(&config);
     (1..=30).map(|index| pipeline.step(coloured(index, RED, RED)).unwrap()).collect()

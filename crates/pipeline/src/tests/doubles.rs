@@ -57,7 +57,7 @@ pub fn person(x: f64, y: f64) -> Detection {
 }
 
 pub fn scored(score: f64, detection: Detection) -> Detection {
-    Detection { score, ..detection }
+    detection.with_score(score)
 }
 
 type ScriptedDetections = BTreeMap<(usize, u64), Vec<Detection>>;
@@ -141,9 +141,11 @@ impl Detector for Script {
             "perhaps depth" => Inputs::NONE.accept(Input::Depth),
             _ => Inputs::NONE,
         };
-        let discovers = self.config.how != "track";
-        let tracks = self.config.how != "discover";
-        Capabilities { inputs, discovers, tracks, weighs: self.config.how == "weigh" }
+        let mut capabilities = Capabilities::new(inputs);
+        capabilities.discovers = self.config.how != "track";
+        capabilities.tracks = self.config.how != "discover";
+        capabilities.weighs = self.config.how == "weigh";
+        capabilities
     }
 
     fn detect(
@@ -238,15 +240,15 @@ impl PersonFilter for Steady {
         state.person.velocity += 0.5 * off / state.age_s.max(0.01);
         state.person.position = detection.position;
         state.age_s = 0.0;
-        Update { nis: Some((off.norm_squared(), 3)) }
+        Update::new(Some((off.norm_squared(), 3)))
     }
 
     fn estimate(&self, state: &State, camera: &Camera) -> Estimate {
-        Estimate {
-            person: state.person,
-            covariance: SMatrix::identity() * (0.02 + 0.3 * state.age_s),
-            region: camera.upper_body(&state.person.position),
-        }
+        Estimate::new(
+            state.person,
+            SMatrix::identity() * (0.02 + 0.3 * state.age_s),
+            camera.upper_body(&state.person.position),
+        )
     }
 }
 
@@ -258,11 +260,12 @@ struct Odd {
 
 impl Filter for Odd {
     fn requirements(&self) -> FilterRequirements {
-        let how = self.config.how.as_str();
-        let image_box = how == "boxes";
-        let likelihood = how == "weighs";
-        let searches = likelihood;
-        FilterRequirements { inputs: Inputs::NONE, image_box, likelihood, searches }
+        let none = FilterRequirements::new(Inputs::NONE);
+        match self.config.how.as_str() {
+            "boxes" => none.with_image_box(),
+            "weighs" => none.with_likelihood().with_search(),
+            _ => none,
+        }
     }
 
     fn start(&mut self, id: TrackId, _: &Detection, _: &Camera) {
@@ -274,7 +277,7 @@ impl Filter for Odd {
 
     fn update(&mut self, _: &Evidence<'_>) -> Result<BTreeMap<TrackId, Update>> {
         let nis = Some((f64::NAN, 3));
-        Ok([(TrackId(4711), Update { nis })].into())
+        Ok([(TrackId(4711), Update::new(nis))].into())
     }
 
     fn estimates(&self, camera: &Camera) -> BTreeMap<TrackId, Estimate> {
@@ -287,7 +290,7 @@ impl Filter for Odd {
             let position = Point3::new(x, f64::from(id.0), 1.6);
             let person = Person { position, velocity: Vector2::zeros() };
             let covariance = SMatrix::identity() * variance;
-            (*id, Estimate { person, covariance, region: camera.upper_body(&position) })
+            (*id, Estimate::new(person, covariance, camera.upper_body(&position)))
         };
         let forgets = self.config.how == "forgets";
         self.ids.iter().filter(|_| !forgets).map(estimate).collect()
@@ -308,7 +311,7 @@ impl Associator for Weighs {
 
     fn associate(&mut self, tracks: &[Track], found: &[Detection], _: &Gate) -> Associations {
         fn pair(track: usize, detection: usize, weight: f64) -> Association {
-            Association { track, detection, weight }
+            Association::new(track, detection, weight)
         }
 
         let pairs = match self.0.how.as_str() {
@@ -317,7 +320,7 @@ impl Associator for Weighs {
                 .map(|track| pair(track, track, weight.parse().unwrap()))
                 .collect(),
         };
-        Associations { pairs, spent: Vec::new() }
+        Associations::new(pairs)
     }
 }
 

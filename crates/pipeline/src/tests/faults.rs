@@ -144,7 +144,7 @@ fn any_detection() -> impl Strategy<Value = Detection> {
     (number(), number(), number(), prop_oneof![4 => 1e-4..2.0f64, 1 => any::<f64>()]).prop_map(
         |(x, y, score, variance)| {
             let known = scored(score, person(x, y));
-            Detection { covariance: nalgebra::Matrix3::identity() * variance, ..known }
+            known.with_covariance(nalgebra::Matrix3::identity() * variance)
         },
     )
 }

@@ -116,12 +116,12 @@ struct RadarDetector;
 impl Detector for RadarDetector {
     fn capabilities(&self) -> Capabilities {
         let inputs = Inputs::NONE.require(Radar::INPUT);
-        Capabilities { inputs, discovers: true, ..Capabilities::default() }
+        Capabilities::new(inputs).discovering()
     }
 
     fn detect(&mut self, frame: &Frame, _: &Query<'_>, _: &mut Funnel) -> Result<Vec<Detection>> {
         let echoes = frame.sensor::<Radar>()?.0.iter();
-        Ok(echoes.map(|metres| Detection { image: None, ..person(*metres, 0.0) }).collect())
+        Ok(echoes.map(|metres| person(*metres, 0.0).with_image(None)).collect())
     }
 }
 

@@ -40,7 +40,7 @@ fn a_high_score_confirms_at_once() {
 #[test]
 fn a_detection_without_a_box_is_tracked_all_the_same() {
     fn boxless(x: f64, y: f64) -> Detection {
-        Detection { image: None, ..person(x, y) }
+        person(x, y).with_image(None)
     }
 
     fn two() -> Vec<Detection> {
@@ -57,7 +57,7 @@ fn a_detection_without_a_box_is_tracked_all_the_same() {
 #[test]
 fn a_filter_of_boxes_receives_no_detection_without_one() {
     let config = PLAIN.replace("'steady'", "'odd'\nconfig = { how = 'boxes' }");
-    let boxless = Detection { image: None, ..person(5.0, 0.0) };
+    let boxless = person(5.0, 0.0).with_image(None);
     let reports = World::of([vec![person(3.0, 0.0), boxless]]).run(&config, 1, 0.1);
     assert_eq!(ids(&reports[0]), [1]);
     assert_eq!(reports[0].candidates.len(), 1);

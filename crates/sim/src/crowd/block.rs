@@ -11,26 +11,18 @@ use crate::world::Object;
 #[serde(deny_unknown_fields)]
 pub struct Block {
     /// Its middle, m.
+    #[schemars(inner(range(min = -1000.0, max = 1000.0)))]
     pub at: [f64; 2],
     /// Length and width, m.
+    #[schemars(inner(range(min = 0.05, max = 200.0)))]
     pub size_m: [f64; 2],
     /// Direction of its length, degrees.
     #[serde(default)]
+    #[schemars(range(min = -1000.0, max = 1000.0))]
     pub heading_deg: f64,
 }
 
 impl Block {
-    /// Returns the conditions on a block, each with the message for a violation.
-    pub(crate) fn rules(&self) -> [(bool, &'static str); 2] {
-        let numbers = self.at.iter().chain([&self.heading_deg]);
-        let is_sized = self.size_m.iter().all(|side_m| (0.05..=200.0).contains(side_m));
-        let is_placed = numbers.into_iter().all(|number| number.abs() <= 1000.0);
-        [
-            (is_sized, "blocks: size_m must be in 0.05 to 200"),
-            (is_placed, "blocks: at and heading_deg must be in -1000 to 1000"),
-        ]
-    }
-
     /// Returns the pose in the world.
     fn pose(&self) -> Isometry2<f64> {
         Isometry2::new(Vector2::from(self.at), self.heading_deg.to_radians())

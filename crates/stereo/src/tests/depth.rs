@@ -49,7 +49,9 @@ fn a_plane_has_its_depth() {
 #[test]
 fn a_reduced_pair_keeps_its_depth() {
     let (small_left, small_right) = noise_pair(100, 80, 5);
-    let twice = |image: &GreyImage| GreyImage::from_fn(200, 160, |x, y| image.row(y / 2)[x / 2]);
+    fn twice(image: &GreyImage) -> GreyImage {
+        GreyImage::from_fn(200, 160, |x, y| image.row(y / 2)[x / 2])
+    }
     let settings = StereoSettings { width: 100, ..StereoSettings::default() };
     let (depth, _) = depth(settings, &frame(twice(&small_left), twice(&small_right)));
     assert_eq!((depth.width(), depth.height()), (200, 160));

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 /// Log-likelihood ratio that a difference of two appearances amounts to, for the associator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum AppearanceEvidence {
     /// 1 for equal appearances, falling with the difference to 0 at `max_difference`, and to no less
     /// than -1.
@@ -18,6 +19,7 @@ pub enum AppearanceEvidence {
 /// another track starts, and two people who passed each other are told apart.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct ReidentificationSettings {
     /// Time for which a person without a track is remembered, s. 0: each track has a number of its
     /// own.

@@ -21,16 +21,8 @@ fn camera() -> Camera {
 fn track(id: u32, y_m: f64, height_m: f64) -> Track {
     let person = Person { position: Point3::new(3.0, y_m, height_m), velocity: Vector2::zeros() };
     let region = camera().upper_body(&person.position);
-    Track {
-        id: TrackId(id),
-        estimate: Estimate { person, covariance: SMatrix::identity() * 0.001, region },
-        seen: true,
-        occluded: false,
-        confirmed: true,
-        age: 9,
-        unseen_s: 0.0,
-        score: 5.0,
-    }
+    Track::new(TrackId(id), Estimate::new(person, SMatrix::identity() * 0.001, region), 5.0)
+        .with_age(9)
 }
 
 /// An image whose left and right half have one colour each.
@@ -196,7 +188,7 @@ fn a_detection_that_looks_like_the_person_of_a_track_speaks_for_it() {
     let stranger =
         scene.stage.compare(&frame(RED, BLUE), &[track(9, 0.8, 1.7)], &detections, false).unwrap();
     assert_eq!(stranger, [[0.0, 0.0]], "nothing is known of a new track");
-    let whole = Detection { image: None, ..detection(0.8) };
+    let whole = detection(0.8).with_image(None);
     let unseen = scene.stage.compare(&frame(RED, BLUE), &tracks, &[whole], false).unwrap();
     assert_eq!(unseen, [[0.0], [0.0]], "without an image box there is no appearance");
 }
@@ -237,7 +229,7 @@ fn the_nearer_person_covers_the_farther_one() {
     let mut far = track(2, 0.0, 1.6);
     far.estimate.person.position.x = 4.0;
     assert!(covers(&near, &far) && !covers(&far, &near));
-    let same = Track { id: TrackId(1), ..far.clone() };
+    let same = far.clone().with_id(TrackId(1));
     assert!(!covers(&near, &same), "nobody covers themselves");
     far.estimate.region.x += 2.0 * far.estimate.region.width;
     assert!(!covers(&near, &far), "beside each other in the image");
@@ -246,13 +238,11 @@ fn the_nearer_person_covers_the_farther_one() {
 /// The person walks to the left at 2 m/s, and so is 2 m further on a second later.
 #[test]
 fn a_person_who_walked_away_is_not_back_at_once() {
-    let walker = Track {
-        estimate: Estimate {
-            person: Person { velocity: Vector2::new(0.0, 2.0), ..*track(1, 0.8, 1.6) },
-            ..track(1, 0.8, 1.6).estimate
-        },
-        ..track(1, 0.8, 1.6)
-    };
+    let walker = track(1, 0.8, 1.6).with_estimate(
+        track(1, 0.8, 1.6)
+            .estimate
+            .with_person(Person { velocity: Vector2::new(0.0, 2.0), ..*track(1, 0.8, 1.6) }),
+    );
     let number_of_next = |max_acceleration_mps2: f64, pause: usize| {
         let mut scene = Scene::new();
         scene.stage.settings.max_acceleration_mps2 = max_acceleration_mps2;

@@ -53,11 +53,7 @@ pub(super) fn tell(simulation: &Simulation, simulated: SimulatedFrame) -> Simula
     let robot = Point2::from(world_from_robot.translation.vector);
     let in_sight = simulation.in_sight(&robot, &places);
     let seen = simulated.truth.iter().zip(in_sight).filter(|(_, is_seen)| *is_seen);
-    let told = seen.map(|(person, _)| ExternalDetection {
-        region: None,
-        head: Some(person.head_in_robot),
-        score: SURE,
-    });
+    let told = seen.map(|(person, _)| ExternalDetection::at(person.head_in_robot, SURE));
     let told = told.collect();
     SimulatedFrame { frame: simulated.frame.with_recorded(Some(told)), ..simulated }
 }

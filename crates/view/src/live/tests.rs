@@ -24,16 +24,7 @@ fn moment(index: u64) -> (Frame, FrameReport) {
     let person = Person { position, velocity: Vector2::new(0.0, 0.5) };
     let region = camera.upper_body(&position);
     let covariance = SMatrix::<f64, 5, 5>::identity() * 0.01;
-    let track = Track {
-        id: TrackId(7),
-        estimate: Estimate { person, covariance, region },
-        seen: true,
-        occluded: false,
-        confirmed: true,
-        age: 5,
-        unseen_s: 0.0,
-        score: 3.0,
-    };
+    let track = Track::new(TrackId(7), Estimate::new(person, covariance, region), 3.0).with_age(5);
     let mut report = FrameReport::new(index, stamp);
     report.tracks = vec![track];
     (Frame::new(index, stamp, camera, EgoMotion::at_rest(0.1), images), report)

@@ -17,6 +17,7 @@ pub enum MotionSource {
 /// Settings of the odometry that is corrected by images.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct OdometrySettings {
     /// `depth`: static points of known depth correct the odometry of the log. `image`: corners of the
     /// images alone, for a log without odometry and depth; of the settings below, `cell_px`,

@@ -121,7 +121,9 @@ fn misunderstood(name: Name, program: &Program, words: &[&str]) -> Result<Option
 /// A word as the shell hands it on; any number for each variable.
 fn plain(word: &&str) -> String {
     let word = word.trim_matches(['\'', '"']);
-    let part = |part: &str| if part.starts_with('$') { "1".to_owned() } else { part.to_owned() };
+    fn part(part: &str) -> String {
+        if part.starts_with('$') { "1".to_owned() } else { part.to_owned() }
+    }
     word.split('/').map(part).collect::<Vec<_>>().join("/")
 }
 

@@ -104,7 +104,7 @@ impl Associator for Buffered {
                 self.memory.record(track.id, region);
             }
         }
-        Associations { spent, ..Associations::one_to_one(staged.given().iter().copied()) }
+        Associations::one_to_one(staged.given().iter().copied()).with_spent(spent)
     }
 }
 
@@ -120,7 +120,7 @@ mod tests {
     }
 
     fn detection(x: f64, score: f64) -> Detection {
-        Detection { score, ..detection_in(at(x)) }
+        detection_in(at(x)).with_score(score)
     }
 
     fn track(id: u32, x: f64) -> Track {
@@ -167,7 +167,7 @@ mod tests {
     fn the_better_of_overlap_and_appearance_counts() {
         let found = [detection(2.0, 3.0), detection(8.0, 3.0)];
         let with = |appearance: &[Vec<f64>]| {
-            let gate = Gate { appearance, ..GATE };
+            let gate = GATE.with_appearance(appearance);
             let mut associator = Buffered::new(Config::default()).unwrap();
             pairs(&associator.associate(&[track(1, 0.0)], &found, &gate))
         };
@@ -180,7 +180,7 @@ mod tests {
         let found = [detection(2.0, 3.0), detection(8.0, 3.0)];
         let with = |fusion: Fusion| {
             let appearance = [vec![-6.0, 0.0]];
-            let gate = Gate { appearance: &appearance, ..GATE };
+            let gate = GATE.with_appearance(&appearance);
             let stages = StageSettings { fusion, ..StageSettings::default() };
             let config = Config { stages, ..Config::default() };
             let mut associator = Buffered::new(config).unwrap();
@@ -194,7 +194,7 @@ mod tests {
         let found = [detection(2.0, 3.0), detection(8.0, 3.0)];
         let with = |fusion_gate: f64| {
             let appearance = [vec![0.0, 6.0]];
-            let gate = Gate { appearance: &appearance, ..GATE };
+            let gate = GATE.with_appearance(&appearance);
             let stages = StageSettings { fusion_gate, ..StageSettings::default() };
             let config = Config { stages, ..Config::default() };
             let mut associator = Buffered::new(config).unwrap();
@@ -235,7 +235,7 @@ mod tests {
 
     #[test]
     fn confirmed_tracks_may_go_first() {
-        let tracks = [track(1, 6.0), Track { confirmed: false, ..track(2, 0.0) }];
+        let tracks = [track(1, 6.0), track(2, 0.0).with_confirmed(false)];
         let with = |confirmed_first: bool| {
             let stages = StageSettings { confirmed_first, ..StageSettings::default() };
             let config = Config { stages, ..Config::default() };

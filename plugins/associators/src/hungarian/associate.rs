@@ -63,10 +63,10 @@ mod tests {
     #[test]
     fn pairs_that_are_probably_no_person_are_not_formed() {
         let mut hungarian = Hungarian::new(Config::default()).unwrap();
-        let doubtful = Detection { score: -2.0, ..detection_at(3.0, 0.0) };
+        let doubtful = detection_at(3.0, 0.0).with_score(-2.0);
         let at = track(3.0, 0.0, 0.01);
         let mut pairs = |score: f64| {
-            let track = Track { score, ..at.clone() };
+            let track = at.clone().with_score(score);
             hungarian.associate(&[track], std::slice::from_ref(&doubtful), &GATE).pairs.len()
         };
         assert_eq!((pairs(1.9), pairs(2.1)), (0, 1), "log-odds add up");
@@ -78,7 +78,7 @@ mod tests {
         let tracks = [0.1, -0.1].map(|y| track(3.0, y, 0.02));
         let seen = [detection_at(3.0, 0.11), detection_at(3.0, -0.11)];
         let mut given = |appearance: &[Vec<f64>]| {
-            let answer = hungarian.associate(&tracks, &seen, &Gate { appearance, ..GATE });
+            let answer = hungarian.associate(&tracks, &seen, &GATE.with_appearance(appearance));
             pairs(&answer).into_iter().map(|(_, detection)| detection).collect::<Vec<_>>()
         };
         assert_eq!(given(&[]), [0, 1]);
@@ -100,7 +100,7 @@ mod tests {
         let given = |fusion: Fusion, fusion_gate: f64| {
             let gating = GateSettings { fusion, fusion_gate, ..GateSettings::default() };
             let config = Config { cost: Cost::Overlap, gating, ..Config::default() };
-            let gate = Gate { appearance: &looks, ..GATE };
+            let gate = GATE.with_appearance(&looks);
             pairs(&Hungarian::new(config).unwrap().associate(&tracks, &seen, &gate))
         };
         assert_eq!(given(Fusion::Minimum, 0.5), [(0, 1), (1, 0)]);

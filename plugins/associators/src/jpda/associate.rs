@@ -59,7 +59,7 @@ impl Jpda {
             for (detection, weight) in detections.iter().zip(row) {
                 if weight >= self.config.min_weight {
                     let weight = weight.min(1.0);
-                    pairs.push(Association { track: *track, detection: *detection, weight });
+                    pairs.push(Association::new(*track, *detection, weight));
                 }
             }
         }
@@ -92,7 +92,7 @@ impl Associator for Jpda {
             .collect();
         let together = clusters(tracks.len(), detections.len(), |t, d| ratios[t][d] > 0.0);
         let pairs = together.iter().flat_map(|cluster| self.weigh_cluster(cluster, &ratios));
-        Associations { pairs: pairs.collect(), spent: Vec::new() }
+        Associations::new(pairs.collect())
     }
 }
 
@@ -148,7 +148,7 @@ mod tests {
             let gating = GateSettings { fusion: Fusion::Minimum, ..GateSettings::default() };
             let config = Config { gating, ..Config::default() };
             let looks = looks.map(|look| vec![look]);
-            let gate = Gate { appearance: &looks, ..GATE };
+            let gate = GATE.with_appearance(&looks);
             let answer = Jpda::new(config).unwrap().associate(&tracks, &[detection(0.0)], &gate);
             [0, 1].map(|at| answer.pairs[at].weight)
         };

@@ -110,7 +110,7 @@ impl Associator for ObservationCentric {
             }
         }
         let spent = staged.left(|at| !strong(at));
-        Associations { spent, ..Associations::one_to_one(staged.given().iter().copied()) }
+        Associations::one_to_one(staged.given().iter().copied()).with_spent(spent)
     }
 }
 
@@ -126,7 +126,7 @@ mod tests {
     }
 
     fn detection(region: Rect, score: f64) -> Detection {
-        Detection { score, ..detection_in(region) }
+        detection_in(region).with_score(score)
     }
 
     fn associator(config: Config) -> ObservationCentric {
@@ -176,7 +176,7 @@ mod tests {
     fn a_tentative_track_gets_what_the_confirmed_ones_leave() {
         let stages = StageSettings { confirmed_first: true, ..StageSettings::default() };
         let config = Config { stages, ..Config::default() };
-        let tentative = Track { confirmed: false, ..track_in(1, at(0.0, 0.0)) };
+        let tentative = track_in(1, at(0.0, 0.0)).with_confirmed(false);
         let mut associator = associator(config);
         let found = [detection(at(1.0, 0.0), 3.0)];
         assert_eq!(pairs(&associator.associate(&[tentative], &found, &GATE)), [(0, 0)]);
@@ -234,8 +234,7 @@ mod tests {
 
     #[test]
     fn confirmed_tracks_may_go_first() {
-        let tracks =
-            [track_in(1, at(6.0, 0.0)), Track { confirmed: false, ..track_in(2, at(0.0, 0.0)) }];
+        let tracks = [track_in(1, at(6.0, 0.0)), track_in(2, at(0.0, 0.0)).with_confirmed(false)];
         let found = [detection(at(0.0, 0.0), 3.0)];
         let answer = |confirmed_first: bool| {
             let stages = StageSettings { confirmed_first, ..StageSettings::default() };
@@ -265,7 +264,7 @@ mod tests {
             pairs(&associator.associate(&[track_in(1, at(1.0, 0.0))], &found, gate))
         };
         assert_eq!(answer(&GATE), [(0, 0)]);
-        assert_eq!(answer(&Gate { appearance: &appearance, ..GATE }), [(0, 1)]);
+        assert_eq!(answer(&GATE.with_appearance(&appearance)), [(0, 1)]);
     }
 
     #[test]
@@ -275,7 +274,7 @@ mod tests {
         let answer = |fusion: Fusion| {
             let stages = StageSettings { fusion, ..StageSettings::default() };
             let mut associator = associator(Config { stages, ..Config::default() });
-            let gate = Gate { appearance: &appearance, ..GATE };
+            let gate = GATE.with_appearance(&appearance);
             pairs(&associator.associate(&[track_in(1, at(1.0, 0.0))], &found, &gate))
         };
         assert_eq!((answer(Fusion::Minimum), answer(Fusion::Sum)), (vec![(0, 0)], vec![(0, 1)]));

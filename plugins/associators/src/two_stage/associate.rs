@@ -70,7 +70,7 @@ impl Associator for TwoStage {
         self.assign_stage(tracks, detections, gate, false, &mut given);
         let weak = (0..detections.len()).filter(|index| !self.is_strong(&detections[*index]));
         let spent = weak.filter(|index| !given.contains(&Some(*index))).collect();
-        Associations { spent, ..Associations::one_to_one(given.iter().copied()) }
+        Associations::one_to_one(given.iter().copied()).with_spent(spent)
     }
 }
 
@@ -82,7 +82,7 @@ mod tests {
     use crate::{Fusion, GateSettings, hungarian};
 
     fn detection(y: f64, score: f64) -> Detection {
-        Detection { score, ..detection_at(3.0, y) }
+        detection_at(3.0, y).with_score(score)
     }
 
     fn track(id: u32, y: f64) -> Track {
@@ -128,7 +128,7 @@ mod tests {
             let gating = GateSettings { fusion, fusion_gate, ..GateSettings::default() };
             let settings = hungarian::Config { gating, ..hungarian::Config::default() };
             let config = Config { pairs: settings, ..Config::default() };
-            let gate = Gate { appearance, ..GATE };
+            let gate = GATE.with_appearance(appearance);
             pairs(&TwoStage::new(config).unwrap().associate(&tracks, &found, &gate))
         };
         assert_eq!(given(&[], 0.0), [(0, 1), (1, 0)]);

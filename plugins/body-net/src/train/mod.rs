@@ -116,7 +116,9 @@ impl NetTrainer {
     }
 
     fn figures(&self, said: &[(f64, bool)], model: &Model) -> toml::Table {
-        let number = |n: usize| toml::Value::Integer(n as i64);
+        fn number(n: usize) -> toml::Value {
+            toml::Value::Integer(n as i64)
+        }
         let people = self.examples.iter().filter(|example| example.is_person).count();
         let groups: std::collections::BTreeSet<u64> =
             self.examples.iter().map(|example| example.group).collect();
@@ -161,11 +163,7 @@ impl Trainer for NetTrainer {
         let net = self.network(&everything, &mut |part| progress(first + (1.0 - first) * part))?;
         let Line { slope, offset } = platt(&said);
         let model = Model { net, slope: thousandths(slope), offset: thousandths(offset) };
-        Ok(Fitted {
-            model: model.to_text(),
-            figures: self.figures(&said, &model),
-            ..Fitted::default()
-        })
+        Ok(Fitted::new(model.to_text(), self.figures(&said, &model)))
     }
 }
 

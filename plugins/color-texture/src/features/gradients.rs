@@ -91,7 +91,9 @@ impl Blocks<'_> {
     /// Mean strength of a block and its neighbours.
     fn around(&self, strength: &[f32], block: usize) -> f32 {
         let [down, across] = self.size();
-        let span = |k: usize, end: usize| k.saturating_sub(1)..(k + 2).min(end);
+        fn span(k: usize, end: usize) -> std::ops::Range<usize> {
+            k.saturating_sub(1)..(k + 2).min(end)
+        }
         let rows = span(block / across, down);
         let columns = span(block % across, across);
         let count = (rows.len() * columns.len()) as f32;

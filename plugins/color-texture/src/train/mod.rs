@@ -156,7 +156,7 @@ impl Trainer for TreeTrainer {
         progress(1.0);
         let figures = self.figures(&trials, &model);
         let text = model.to_text().map_err(Error::Other)?;
-        Ok(Fitted { model: text, figures, ..Fitted::default() })
+        Ok(Fitted::new(text, figures))
     }
 }
 
@@ -205,12 +205,16 @@ impl Trial {
 /// Returns the share of each family in the votes of the trees.
 fn influence(model: &Model) -> toml::Table {
     fn first(tree: &Tree) -> (usize, f64) {
-        let mean = |stump: &Stump| 0.5 * (stump.below + stump.above);
+        fn mean(stump: &Stump) -> f32 {
+            0.5 * (stump.below + stump.above)
+        }
         let reach = f64::from((mean(&tree.above) - mean(&tree.below)).abs());
         (tree.feature, reach)
     }
 
-    let reach = |stump: &Stump| f64::from((stump.above - stump.below).abs());
+    fn reach(stump: &Stump) -> f64 {
+        f64::from((stump.above - stump.below).abs())
+    }
     let stumps = || model.trees.iter().flat_map(|tree| [tree.below, tree.above]);
     let all: Vec<(usize, f64)> =
         stumps().map(|s| (s.feature, reach(&s))).chain(model.trees.iter().map(first)).collect();

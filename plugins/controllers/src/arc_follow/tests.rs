@@ -27,7 +27,7 @@ fn command(controller: &mut ArcFollow, motion: EgoMotion, target: Option<&Track>
     let tracks = target.map_or(&[][..], std::slice::from_ref);
     let frame = frame(motion);
     let max_speed_mps = MAX_MPS;
-    let scene = Scene { frame: &frame, target, tracks, wheels: WHEELS, max_speed_mps };
+    let scene = Scene::new(&frame, tracks, WHEELS, max_speed_mps).with_target(target);
     WHEELS.wheels(controller.command(&scene))
 }
 
@@ -116,7 +116,7 @@ fn a_drive_that_cannot_be_is_not_steered() {
         let wheels = DiffDrive { half_separation_m, slip: 0.0 };
         let target = Some(&person);
         let tracks = &[][..];
-        let scene = Scene { frame: &frame, target, tracks, wheels, max_speed_mps };
+        let scene = Scene::new(&frame, tracks, wheels, max_speed_mps).with_target(target);
         controller.command(&scene) != Twist::STOP
     };
     assert!(drives(0.167, 0.9));

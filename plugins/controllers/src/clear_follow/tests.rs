@@ -30,7 +30,7 @@ fn command(
     let images = Images { depth: depth.map(Arc::new), ..Images::default() };
     let frame = Frame::new(1, Stamp::default(), camera(), motion, images);
     let tracks = target.map_or(&[][..], std::slice::from_ref);
-    let scene = Scene { frame: &frame, target, tracks, wheels: WHEELS, max_speed_mps: MAX_MPS };
+    let scene = Scene::new(&frame, tracks, WHEELS, MAX_MPS).with_target(target);
     WHEELS.wheels_within(controller.command(&scene), MAX_MPS)
 }
 
@@ -199,7 +199,7 @@ fn a_detour_keeps_its_curvature_while_the_robot_speeds_up() {
 fn somebody_unseen_is_followed_ever_more_slowly_and_then_no_more() {
     fn speed(unseen_s: f64) -> f64 {
         let mut controller = ClearFollow::new(prompt()).unwrap();
-        let person = Track { seen: false, unseen_s, ..target(4.0, 0.0, Vector2::zeros()) };
+        let person = target(4.0, 0.0, Vector2::zeros()).with_seen(false).with_unseen_s(unseen_s);
         let still = EgoMotion::at_rest(0.1);
         let steps = (0..30).map(|_| command(&mut controller, still, None, Some(&person)).left);
         steps.last().unwrap()
@@ -211,7 +211,7 @@ fn somebody_unseen_is_followed_ever_more_slowly_and_then_no_more() {
     }
     let patient = Config { max_unseen_s: 2.0, max_acceleration: 1e3, ..prompt() };
     let mut controller = ClearFollow::new(patient).unwrap();
-    let person = Track { seen: false, unseen_s: 1.5, ..target(4.0, 0.0, Vector2::zeros()) };
+    let person = target(4.0, 0.0, Vector2::zeros()).with_seen(false).with_unseen_s(1.5);
     let wheels = command(&mut controller, EgoMotion::at_rest(0.1), None, Some(&person));
     assert!((wheels.left - 0.45).abs() < 1e-9, "three quarters of the time");
 }
@@ -230,7 +230,7 @@ fn the_person_is_no_obstacle_and_others_are() {
         let frame = Frame::new(1, Stamp::default(), camera(), EgoMotion::at_rest(0.1), images);
         let target = Some(&person);
         let tracks = &tracks[..];
-        let scene = Scene { frame: &frame, target, tracks, wheels: WHEELS, max_speed_mps: MAX_MPS };
+        let scene = Scene::new(&frame, tracks, WHEELS, MAX_MPS).with_target(target);
         (0..30).map(|_| controller.command(&scene)).last().unwrap()
     };
     let free = settled(None, None);
@@ -268,7 +268,7 @@ fn a_drive_that_cannot_be_is_not_steered() {
         let mut controller = ClearFollow::new(prompt()).unwrap();
         let target = Some(&person);
         let tracks = &[][..];
-        let scene = Scene { frame: &frame, target, tracks, wheels, max_speed_mps };
+        let scene = Scene::new(&frame, tracks, wheels, max_speed_mps).with_target(target);
         controller.command(&scene) != Twist::STOP
     };
     assert!(drives(0.167, 0.9));
@@ -301,7 +301,7 @@ fn any_number() -> impl Strategy<Value = f64> {
 fn any_target() -> impl Strategy<Value = Track> {
     let velocity = (any_number(), any_number());
     (any_number(), any_number(), velocity, any_number()).prop_map(|(x, y, (vx, vy), unseen_s)| {
-        Track { unseen_s, ..target(x, y, Vector2::new(vx, vy)) }
+        target(x, y, Vector2::new(vx, vy)).with_unseen_s(unseen_s)
     })
 }
 

@@ -165,7 +165,7 @@ impl Trainer for DepthNetTrainer {
         let folds = self.folds(&begun, &simulated, &mut steps)?;
         if folds.is_empty() {
             let model = finished(begun, &in_simulation);
-            return Ok(Fitted { model: model.to_text(), figures, ..Fitted::default() });
+            return Ok(Fitted::new(model.to_text(), figures));
         }
         for fold in &folds {
             let before = self.scored(&begun, &self.in_room(&fold.room));
@@ -177,7 +177,7 @@ impl Trainer for DepthNetTrainer {
         let real = self.chosen(|sample| sample.room.is_some());
         let net = self.further(begun, [&simulated, &real], &mut steps)?;
         let model = finished(net, &held_out).to_text();
-        Ok(Fitted { model, figures, without: models_without(folds, &in_simulation) })
+        Ok(Fitted::new(model, figures).with_rooms_left_out(models_without(folds, &in_simulation)))
     }
 }
 
@@ -307,7 +307,7 @@ mod tests {
         let images = World::with(&figures).draw(&camera);
         let frame = Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), images);
         let head = Point3::new(2.5, 0.4, 1.6);
-        let person = AnnotatedPerson { head, counts: true, visible: 1.0 };
+        let person = AnnotatedPerson::new(head);
         trainer.add_frame(&frame, &vec![person; figures.len()], room, group).unwrap();
     }
 

@@ -192,7 +192,7 @@ mod tests {
         let images = World::with(&[Figure::at(2.5, 0.4)]).draw(&camera);
         let frame = Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), images);
         let head = Point3::new(2.5, 0.4, 1.6);
-        let person = AnnotatedPerson { head, counts: true, visible: 1.0 };
+        let person = AnnotatedPerson::new(head);
         Sample::new(&frame, &[person], None, 0).unwrap()
     }
 
@@ -319,7 +319,9 @@ mod tests {
     #[test]
     fn readings_are_lost_here_and_there_in_blocks_and_far_away() {
         fn lost(metres: f32) -> Vec<f64> {
-            let share = |depth: &DepthImage| 1.0 - readings(depth).len() as f64 / (120.0 * 90.0);
+            fn share(depth: &DepthImage) -> f64 {
+                1.0 - readings(depth).len() as f64 / (120.0 * 90.0)
+            }
             degraded(metres).iter().map(share).collect()
         }
 
@@ -377,7 +379,9 @@ mod tests {
         for seed in 0..100 {
             let (camera, image) = cut(sample.camera.clone(), sample.depth(), &mut Draws(mix(seed)));
             assert_eq!((camera.height, camera.width), (image.height(), 320));
-            let pixel = |camera: &Camera| camera.project(&Point3::new(2.5, 0.4, 1.2)).unwrap();
+            fn pixel(camera: &Camera) -> nalgebra::Point2<f64> {
+                camera.project(&Point3::new(2.5, 0.4, 1.2)).unwrap()
+            }
             let top = (pixel(&sample.camera).y - pixel(&camera).y).round() as usize;
             for y in [0, image.height() - 1] {
                 let depth = sample.depth();

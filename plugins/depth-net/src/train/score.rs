@@ -107,7 +107,9 @@ impl Score {
 
     /// Returns the figures for a card.
     pub fn figures(&self) -> toml::Table {
-        let rounded = |value: f64| toml::Value::from((value * 1e3).round() / 1e3);
+        fn rounded(value: f64) -> toml::Value {
+            toml::Value::from((value * 1e3).round() / 1e3)
+        }
         let (recall, wrong) = self.at(0.0);
         let off: Vec<f64> =
             self.found.iter().filter(|(l, is, _)| *is && *l >= 0.0).map(|(.., off)| *off).collect();
@@ -137,7 +139,9 @@ mod tests {
     /// the visible part.
     fn sample(people: &[([f64; 2], bool, f64)]) -> Sample {
         fn person(([x, y], counts, visible): &([f64; 2], bool, f64)) -> AnnotatedPerson {
-            AnnotatedPerson { head: Point3::new(*x, *y, 1.6), counts: *counts, visible: *visible }
+            AnnotatedPerson::new(Point3::new(*x, *y, 1.6))
+                .with_counts(*counts)
+                .with_visible(*visible)
         }
 
         let lens =

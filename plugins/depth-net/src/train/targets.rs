@@ -209,7 +209,7 @@ mod tests {
     #[test]
     fn the_surface_of_a_person_is_what_the_camera_sees_of_it() {
         fn person(x: f64, y: f64) -> AnnotatedPerson {
-            AnnotatedPerson { head: nalgebra::Point3::new(x, y, 1.6), counts: true, visible: 1.0 }
+            AnnotatedPerson::new(nalgebra::Point3::new(x, y, 1.6))
         }
 
         let lens = tagalong_geometry::Pinhole {

@@ -98,10 +98,12 @@ pub(super) fn stage(cascade: &mut Cascade, samples: &Samples<'_>, training: &Tra
 
 /// Converts a tree to one of the cascade, and adds its features.
 fn kept(tree: &[Question], features: &[Feature], cascade: &mut Cascade) -> Tree {
-    let next = |next: boost::Next| match next {
-        boost::Next::Question(to) => Next::Node(to),
-        boost::Next::Leaf(value) => Next::Leaf(value),
-    };
+    fn next(next: boost::Next) -> Next {
+        match next {
+            boost::Next::Question(to) => Next::Node(to),
+            boost::Next::Leaf(value) => Next::Leaf(value),
+        }
+    }
     tree.iter()
         .map(|question| {
             cascade.features.push(features[question.feature].clone());

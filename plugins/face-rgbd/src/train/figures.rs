@@ -112,7 +112,9 @@ fn found_in(
 /// stages find, down to half of them.
 pub(super) fn figures(cascade: &Cascade, config: &Config, pictures: &[Picture]) -> toml::Table {
     let empty = found_in(cascade, config, pictures, Use::Figures, false);
-    let integer = |n: usize| toml::Value::Integer(n as i64);
+    fn integer(n: usize) -> toml::Value {
+        toml::Value::Integer(n as i64)
+    }
     let mut table = toml::Table::from_iter([
         ("held_out_pictures_without".to_owned(), integer(empty.pictures)),
         ("false_alarms_in_those".to_owned(), integer(empty.groups.len())),

@@ -238,7 +238,7 @@ impl Trainer for CascadeTrainer {
         table.insert("mined".into(), list(|m| m.found as i64));
         table.insert("searched".into(), list(|m| m.looked_at as i64));
         progress(1.0);
-        Ok(Fitted { model: cascade.to_xml(), figures: table, ..Fitted::default() })
+        Ok(Fitted::new(cascade.to_xml(), table))
     }
 }
 

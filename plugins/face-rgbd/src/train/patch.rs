@@ -101,9 +101,9 @@ mod tests {
     /// The contrast is that of the window without its border: 324 times the deviation.
     #[test]
     fn a_patch_has_contrast_or_is_none() {
-        let chequers = |bright: u8| {
+        fn chequers(bright: u8) -> GreyImage {
             GreyImage::from_fn(20, 20, |x, y| if (x + y).is_multiple_of(2) { 100 } else { bright })
-        };
+        }
         let contrast = Patch::new(&chequers(140), 20).unwrap().contrast;
         assert!((contrast * 324.0 * 20.0 - 1.0).abs() < 1e-4, "{contrast}");
         assert!(

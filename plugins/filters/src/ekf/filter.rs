@@ -121,7 +121,7 @@ impl PersonFilter for Ekf {
         let gain: Matrix5x3 = p.fixed_columns::<3>(0) * inverted;
         state.mean += gain * innovation;
         state.covariance = corrected(&p, &gain, &r);
-        Update { nis: Some((nis, measured)) }
+        Update::new(Some((nis, measured)))
     }
 
     fn merge(&self, alternatives: &[(f64, State)]) -> State {
@@ -136,11 +136,11 @@ impl PersonFilter for Ekf {
     fn estimate(&self, state: &State, camera: &Camera) -> Estimate {
         let m = &state.mean;
         let position = Point3::new(m[0], m[1], m[2]);
-        Estimate {
-            person: Person { position, velocity: Vector2::new(m[3], m[4]) },
-            covariance: state.covariance,
-            region: camera.upper_body(&position),
-        }
+        Estimate::new(
+            Person { position, velocity: Vector2::new(m[3], m[4]) },
+            state.covariance,
+            camera.upper_body(&position),
+        )
     }
 }
 

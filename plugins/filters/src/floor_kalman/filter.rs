@@ -82,11 +82,11 @@ impl FloorKalman {
         set(0, 3, &cross);
         set(3, 0, &cross.transpose());
         covariance[(2, 2)] = state.height.1;
-        Estimate {
-            person: Person { position, velocity: turn * velocity },
+        Estimate::new(
+            Person { position, velocity: turn * velocity },
             covariance,
-            region: camera.upper_body(&position),
-        }
+            camera.upper_body(&position),
+        )
     }
 }
 
@@ -117,7 +117,7 @@ impl Filter for FloorKalman {
             if height < UNMEASURED_M2 {
                 state.correct_height(detection.position.z, height);
             }
-            supported.insert(id, Update { nis: nis.map(|nis| (nis, 2)) });
+            supported.insert(id, Update::new(nis.map(|nis| (nis, 2))));
         }
         Ok(supported)
     }

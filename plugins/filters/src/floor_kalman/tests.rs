@@ -30,7 +30,7 @@ fn sighting(x: f64, y: f64) -> Detection {
 fn see(filter: &mut FloorKalman, detection: &Detection) -> (f64, u32) {
     let matched = [Matched::certain(ID, detection)];
     let frame = frame();
-    let evidence = Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
+    let evidence = Evidence::new(&frame, &matched);
     filter.update(&evidence).unwrap()[&ID].nis.unwrap()
 }
 
@@ -271,7 +271,7 @@ fn four_states_are_those_of_a_filter_written_down() {
     let sighting = |x: f64, y: f64| {
         let mut covariance = Matrix3::from_diagonal_element(0.02);
         covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&r);
-        Detection { covariance, ..sighting(x, y) }
+        sighting(x, y).with_covariance(covariance)
     };
     let mut room_from_robot = Isometry2::new(Vector2::zeros(), -30.0_f64.to_radians());
     filter.start(ID, &sighting(2.0, 1.0), &camera());
@@ -462,7 +462,7 @@ fn who_is_stopped_is_forgotten_and_a_stranger_gives_no_support() {
     let frame = frame();
     let detection = sighting(2.0, 0.1);
     let matched = [Matched::certain(other, &detection)];
-    let evidence = Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
+    let evidence = Evidence::new(&frame, &matched);
     assert!(filter.update(&evidence).unwrap().is_empty());
     filter.stop(other);
     assert_eq!(filter.estimates(&camera()).len(), 1);

@@ -2,7 +2,8 @@ use std::collections::BTreeMap;
 
 use tagalong_config::check_settings;
 use tagalong_core::{
-    Detection, EgoMotion, Estimate, Evidence, Filter, FilterRequirements, Result, TrackId, Update,
+    Detection, EgoMotion, Estimate, Evidence, Filter, FilterRequirements, Inputs, Result, TrackId,
+    Update,
 };
 use tagalong_geometry::Camera;
 
@@ -31,7 +32,7 @@ impl Filter for ImageKalman {
     /// The state is that of a box; a box invented from a position would be counted as evidence
     /// beside the position.
     fn requirements(&self) -> FilterRequirements {
-        FilterRequirements { image_box: true, ..FilterRequirements::default() }
+        FilterRequirements::new(Inputs::NONE).with_image_box()
     }
 
     fn start(&mut self, id: TrackId, detection: &Detection, camera: &Camera) {

@@ -203,7 +203,7 @@ impl State {
         self.stay_in_range();
         self.observed = config.observed_boxes.then(|| seen.rect_in(camera));
         let parts = [by_box.map(|nis| (nis, 3)), by_range.map(|nis| (nis, 1))];
-        Update { nis: parts.into_iter().flatten().reduce(|a, b| (a.0 + b.0, a.1 + b.1)) }
+        Update::new(parts.into_iter().flatten().reduce(|a, b| (a.0 + b.0, a.1 + b.1)))
     }
 
     /// Returns true for a person behind the camera, whose box means nothing.
@@ -305,15 +305,15 @@ impl State {
         let height = self.image[4] * self.shape.aspect;
         let left = self.image[0] - 0.5 * width;
         let top = self.image[1] - 0.5 * height;
-        Estimate {
-            person: Person { position: place.position, velocity: place.velocity.xy() },
-            covariance: symmetric(covariance),
-            region: match (self.behind, self.observed) {
+        Estimate::new(
+            Person { position: place.position, velocity: place.velocity.xy() },
+            symmetric(covariance),
+            match (self.behind, self.observed) {
                 (Some(_), _) => Rect::default(),
                 (None, Some(observed)) => observed,
                 (None, None) => Rect::new(left, top, width, height),
             },
-        }
+        )
     }
 
     /// Returns the head in image coordinates and range.

@@ -155,7 +155,7 @@ mod tests {
         let position = Point3::new(5.0, y_m, 1.5);
         let image = Some(ImageBox::upper_body(camera().upper_body(&position)));
         let covariance = Matrix3::identity() * 1e-4;
-        Detection { image, ..Detection::new("test", position, covariance, 3.0) }
+        Detection::new("test", position, covariance, 3.0).with_image(image)
     }
 
     fn config(manoeuvre_factor: f64) -> Config {

@@ -71,5 +71,5 @@ fn between(from: &Detection, to: &Detection, part: f64, camera: &Camera) -> Dete
         Rect::new(mix(a.x, b.x), mix(a.y, b.y), mix(a.width, b.width), mix(a.height, b.height));
     let position = from.position + (to.position - from.position) * part;
     let image = to.image.map(|image| ImageBox { rect, ..image });
-    Detection { image, position, ..to.clone() }
+    to.clone().with_image(image).with_position(position)
 }

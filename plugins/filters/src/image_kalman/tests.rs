@@ -42,9 +42,7 @@ fn sliding(frames: usize) -> Vec<Detection> {
         x: start.rect().unwrap().x + 120.0 * DT_S * i as f64,
         ..start.rect().unwrap()
     };
-    (0..frames)
-        .map(|i| Detection { image: Some(ImageBox::upper_body(shifted(i))), ..start.clone() })
-        .collect()
+    (0..frames).map(|i| start.clone().with_image(ImageBox::upper_body(shifted(i)))).collect()
 }
 
 #[test]
@@ -174,10 +172,7 @@ fn a_person_who_came_near_is_not_foreseen_behind_the_camera() {
 fn a_box_of_any_shape_keeps_its_shape() {
     let seen = person(Point3::new(4.0, 0.3, 1.6));
     let Rect { x, y, width, height } = seen.rect().unwrap();
-    let tall = Detection {
-        image: Some(ImageBox::upper_body(Rect::new(x, y, width, 2.6 * height))),
-        ..seen
-    };
+    let tall = seen.with_image(ImageBox::upper_body(Rect::new(x, y, width, 2.6 * height)));
     let state = fed(Config::default(), &vec![tall.clone(); 5], EgoMotion::at_rest(DT_S));
     let estimate = state.estimate(&camera());
     assert!(estimate.region.iou(&tall.rect().unwrap()) > 0.999, "{:?}", estimate.region);
@@ -193,7 +188,7 @@ fn a_depth_that_is_a_guess_stays_uncertain() {
 
     let sure = person(Point3::new(4.0, 0.3, 1.6));
     let toward = camera().robot_from_camera.rotation * Vector3::z();
-    let guess = Detection { covariance: toward * toward.transpose(), ..sure.clone() };
+    let guess = sure.clone().with_covariance(toward * toward.transpose());
     assert!(sigma(&sure) < 0.05 && sigma(&guess) > 0.5, "{} {}", sigma(&sure), sigma(&guess));
 }
 
@@ -201,14 +196,11 @@ fn a_depth_that_is_a_guess_stays_uncertain() {
 fn sightings_that_make_no_sense_leave_finite_numbers() {
     let seen = person(Point3::new(4.0, 0.3, 1.6));
     let odd = [
-        Detection { image: Some(ImageBox::upper_body(Rect::default())), ..seen.clone() },
-        Detection { position: Point3::new(-3.0, 0.0, 1.6), ..seen.clone() },
-        Detection { covariance: Matrix3::zeros(), ..seen.clone() },
-        Detection { covariance: Matrix3::identity() * 1e12, ..seen.clone() },
-        Detection {
-            image: Some(ImageBox::upper_body(Rect::new(-1e6, 1e6, 1e5, 1.0))),
-            ..seen.clone()
-        },
+        seen.clone().with_image(ImageBox::upper_body(Rect::default())),
+        seen.clone().with_position(Point3::new(-3.0, 0.0, 1.6)),
+        seen.clone().with_covariance(Matrix3::zeros()),
+        seen.clone().with_covariance(Matrix3::identity() * 1e12),
+        seen.clone().with_image(ImageBox::upper_body(Rect::new(-1e6, 1e6, 1e5, 1.0))),
     ];
     let moves = EgoMotion { forward: 3.0, turn: 2.0, ..EgoMotion::at_rest(0.0) };
     for odd in odd {
@@ -218,8 +210,7 @@ fn sightings_that_make_no_sense_leave_finite_numbers() {
             filter.predict(&moves, &camera());
             let frame = Frame::new(1, Stamp::default(), camera(), moves, Images::default());
             let matched = [Matched::certain(TrackId(1), seen)];
-            let evidence =
-                Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
+            let evidence = Evidence::new(&frame, &matched);
             filter.update(&evidence).unwrap();
             let estimate = &filter.estimates(&camera())[&TrackId(1)];
             assert!(estimate.is_sane(), "{odd:?}: {estimate:?}");
@@ -306,10 +297,8 @@ fn a_step_is_that_of_the_textbook() {
     let ((camera, first), config, dt) = (ahead(4.0), Config::default(), 0.1);
     let (_, farther) = ahead(4.2);
     let Rect { x, y, width, height } = first.rect().unwrap();
-    let second = Detection {
-        image: Some(ImageBox::upper_body(Rect::new(x + 5.0, y - 3.0, width + 4.0, height))),
-        ..farther
-    };
+    let second =
+        farther.with_image(ImageBox::upper_body(Rect::new(x + 5.0, y - 3.0, width + 4.0, height)));
     let mut state = State::start(&config, &first, &camera);
     let noise = |width: f64| (config.sigma_centre * width).powi(2);
     let speed = (config.initial_speed * width).powi(2);
@@ -393,10 +382,7 @@ fn a_box_grows_as_the_robot_comes_near() {
 #[test]
 fn a_range_that_is_a_guess_makes_the_place_after_a_step_one() {
     let ((camera, sure), config) = (ahead(4.0), Config::default());
-    let guess = Detection {
-        covariance: Matrix3::from_diagonal(&Vector3::new(1.0, 0.0, 0.0)),
-        ..sure.clone()
-    };
+    let guess = sure.clone().with_covariance(Matrix3::from_diagonal(&Vector3::new(1.0, 0.0, 0.0)));
     let step = EgoMotion { left: 0.4, ..EgoMotion::at_rest(1e-3) };
     let sigma = |seen: &Detection| {
         let mut state = State::start(&config, seen, &camera);
@@ -414,10 +400,10 @@ fn a_range_that_cannot_be_is_left_out() {
     let ((camera, seen), config) = (ahead(4.0), Config::default());
     let mut state = State::start(&config, &seen, &camera);
     let eye = Point3::from(camera.robot_from_camera.translation.vector);
-    let here = Detection { position: eye + Vector3::new(0.1, 0.0, 0.0), ..seen.clone() };
+    let here = seen.clone().with_position(eye + Vector3::new(0.1, 0.0, 0.0));
     assert_eq!(state.correct(&config, &here, &camera).nis.unwrap().1, 3);
     assert_eq!(state.range.x, 4.0);
-    let near = Detection { position: eye + Vector3::new(0.2, 0.0, 0.0), ..seen };
+    let near = seen.with_position(eye + Vector3::new(0.2, 0.0, 0.0));
     assert_eq!(state.correct(&config, &near, &camera).nis.unwrap().1, 4);
     assert!(state.range.x < 4.0);
 }
@@ -426,10 +412,7 @@ fn a_range_that_cannot_be_is_left_out() {
 fn the_shape_follows_what_is_seen_by_its_weight() {
     let (camera, seen) = ahead(4.0);
     let Rect { x, y, width, height } = seen.rect().unwrap();
-    let tall = Detection {
-        image: Some(ImageBox::upper_body(Rect::new(x, y, width, 2.0 * height))),
-        ..seen.clone()
-    };
+    let tall = seen.clone().with_image(ImageBox::upper_body(Rect::new(x, y, width, 2.0 * height)));
     for (shape_weight, aspect) in [(0.0, 1.0), (0.25, 1.25), (1.0, 2.0)] {
         let config = Config { shape_weight, ..Config::default() };
         let mut state = State::start(&config, &seen, &camera);
@@ -441,11 +424,7 @@ fn the_shape_follows_what_is_seen_by_its_weight() {
     let config = Config { shape_weight: 1.0, ..Config::default() };
     for flat in [Rect::new(x, y, width, 0.5), Rect::new(x, y, 0.5, height)] {
         let mut state = State::start(&config, &seen, &camera);
-        state.correct(
-            &config,
-            &Detection { image: Some(ImageBox::upper_body(flat)), ..seen.clone() },
-            &camera,
-        );
+        state.correct(&config, &seen.clone().with_image(ImageBox::upper_body(flat)), &camera);
         let Rect { width, height, .. } = state.estimate(&camera).region;
         assert!((height / width - 1.0).abs() < 1e-9, "{width} {height}");
     }
@@ -457,13 +436,13 @@ fn only_whoever_is_tracked_is_supported_and_a_stopped_one_is_gone() {
     let mut filter = ImageKalman::new(Config::default()).unwrap();
     filter.start(TrackId(1), &seen, &camera);
     let camera = Arc::new(camera);
-    let frame = |camera: &Arc<Camera>| {
+    fn frame(camera: &Arc<Camera>) -> Frame {
         let motion = EgoMotion::at_rest(0.1);
         Frame::new(1, Stamp::default(), Arc::clone(camera), motion, Images::default())
-    };
+    }
     let frame = frame(&camera);
     let matched = [1, 2].map(|id| Matched::certain(TrackId(id), &seen));
-    let evidence = Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
+    let evidence = Evidence::new(&frame, &matched);
     let supports = filter.update(&evidence).unwrap();
     assert_eq!(supports.keys().collect::<Vec<_>>(), [&TrackId(1)]);
     filter.stop(TrackId(1));
@@ -492,7 +471,7 @@ proptest! {
         x in 1.5..7.0f64, y in -1.0..1.0f64, z in 0.8..1.9f64,
     ) {
         let covariance = Matrix3::new(0.04, 0.01, 0.0, 0.01, 0.09, 0.0, 0.0, 0.0, 0.01);
-        let seen = Detection { covariance, ..person(Point3::new(x, y, z)) };
+        let seen = person(Point3::new(x, y, z)).with_covariance(covariance);
         let exact = Config { sigma_centre: 1e-6, sigma_range_m: 1e-6, ..Config::default() };
         let estimate = State::start(&exact, &seen, &camera()).estimate(&camera());
         let toward = (seen.position - camera().robot_from_camera.translation.vector).coords;
@@ -532,10 +511,7 @@ fn after_a_gap(reupdate: bool, reached: u32) -> f64 {
     filter.start(TrackId(1), &seen, &camera);
     let at = |x: f64| {
         let Rect { width, height, .. } = seen.rect().unwrap();
-        Detection {
-            image: Some(ImageBox::upper_body(Rect::new(x, 100.0, width, height))),
-            ..seen.clone()
-        }
+        seen.clone().with_image(ImageBox::upper_body(Rect::new(x, 100.0, width, height)))
     };
     let camera = Arc::new(camera);
     for index in 1..=20_u32 {
@@ -548,8 +524,7 @@ fn after_a_gap(reupdate: bool, reached: u32) -> f64 {
         let stamp = Stamp::default();
         let frame = Frame::new(index.into(), stamp, Arc::clone(&camera), motion, Images::default());
         let matched = [Matched::certain(TrackId(1), &found)];
-        let evidence =
-            Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
+        let evidence = Evidence::new(&frame, &matched);
         filter.update(&evidence).unwrap();
     }
     let place = filter.estimates(&camera)[&TrackId(1)].region.x;
@@ -580,8 +555,7 @@ fn without_a_gap_nothing_is_filtered_anew() {
             let stamp = Stamp::default();
             let frame = Frame::new(index, stamp, Arc::clone(&camera), motion, Images::default());
             let matched = [Matched::certain(TrackId(1), &seen)];
-            let evidence =
-                Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
+            let evidence = Evidence::new(&frame, &matched);
             filter.update(&evidence).unwrap();
         }
         filter.estimates(&camera)[&TrackId(1)].clone()

@@ -86,11 +86,11 @@ impl PersonFilter for LastSeen {
     fn estimate(&self, state: &State, camera: &Camera) -> Estimate {
         let mut covariance = SMatrix::<f64, 5, 5>::identity() * VELOCITY_VARIANCE;
         covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&state.covariance);
-        Estimate {
-            person: Person { position: state.position, velocity: velocity(&state.sightings) },
+        Estimate::new(
+            Person { position: state.position, velocity: velocity(&state.sightings) },
             covariance,
-            region: camera.upper_body(&state.position),
-        }
+            camera.upper_body(&state.position),
+        )
     }
 }
 

@@ -227,7 +227,9 @@ impl HogTrainer {
         let people = sums.iter().filter(|(_, is_person)| *is_person).count();
         let log_odds: Vec<(f64, bool)> =
             sums.iter().map(|(sum, is)| (model.log_odds(*sum as f32), *is)).collect();
-        let integer = |n: usize| toml::Value::Integer(n as i64);
+        fn integer(n: usize) -> toml::Value {
+            toml::Value::Integer(n as i64)
+        }
         let mut table = toml::Table::from_iter([
             ("windows_of_people".to_owned(), integer(self.count(true))),
             ("windows_of_others".to_owned(), integer(self.count(false))),
@@ -371,7 +373,7 @@ impl Trainer for HogTrainer {
             figures.insert("rooms".into(), in_rooms.into());
         }
         let text = model.to_text().map_err(Error::Other)?;
-        Ok(Fitted { model: text, figures, without })
+        Ok(Fitted::new(text, figures).with_rooms_left_out(without))
     }
 }
 
@@ -462,11 +464,9 @@ mod tests {
     /// Two rounds of trees: the first gives -1 or, for a first number below a half, -3, and the
     /// second one gives -1 to all.
     fn trees() -> Model {
-        let tree = |yes: f32| crate::Tree {
-            numbers: [0; 3],
-            below: [0.5; 3],
-            values: [yes, yes, -0.125, -0.125],
-        };
+        fn tree(yes: f32) -> crate::Tree {
+            crate::Tree { numbers: [0; 3], below: [0.5; 3], values: [yes, yes, -0.125, -0.125] }
+        }
         let rounds = [[tree(-0.375); ROUND], [tree(-0.125); ROUND]].concat();
         of_trees(Trees::new(rounds, HOPELESS))
     }

@@ -403,7 +403,9 @@ fn the_compared_places_of_both_count_from_the_near_one() {
 fn walked(swap_margin: f64, mirrored: bool) -> Rig {
     // The second person faces left, the first one towards the robot.
     fn facing(scene: &[Person]) -> f64 {
-        let fits = |p: &&Person| (p.velocity.y > 0.3) == (p.position.y < 0.0);
+        fn fits(p: &&Person) -> bool {
+            (p.velocity.y > 0.3) == (p.position.y < 0.0)
+        }
         5.0 * scene.len() as f64 + 2.0 * scene.iter().filter(fits).count() as f64
     }
 
@@ -412,11 +414,11 @@ fn walked(swap_margin: f64, mirrored: bool) -> Rig {
     let at = |y: f64| sighting(Point3::new(2.0, y, 1.6), [0.02; 3]);
     rig.start(1, [2.0, 0.7, 1.6], [0.02; 3]);
     rig.start(2, [2.0, -0.7, 1.6], [0.02; 3]);
-    let image = |mirrored: bool| {
+    fn image(mirrored: bool) -> Option<RgbImage> {
         Some(RgbImage::from_fn(100, 80, |x, _| {
             if (x < 50) != mirrored { [200, 20, 20] } else { [20, 20, 200] }
         }))
-    };
+    }
     let mut look = |y: f64, mirrored| {
         let sightings = [(1, at(y)), (2, at(-y))];
         rig.look_after(EgoMotion::at_rest(0.1), &Formula::new(facing), &sightings, image(mirrored));

@@ -91,7 +91,7 @@ impl Rig {
             .collect();
         self.filter.predict(&motion, &frame.camera);
         let likelihood: Option<&dyn Likelihood> = Some(likelihood);
-        let evidence = Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood };
+        let evidence = Evidence::new(&frame, &matched).with_likelihood(likelihood);
         let seen: std::collections::BTreeMap<TrackId, Update> =
             self.filter.update(&evidence).unwrap();
         seen.into_keys().map(|id| id.0).collect()
@@ -109,7 +109,7 @@ impl Rig {
     pub fn sketch(&self, likelihood: &Formula) -> Sketch {
         let frame = frame(EgoMotion::at_rest(0.1), None);
         let likelihood: Option<&dyn Likelihood> = Some(likelihood);
-        let evidence = Evidence { frame: &frame, matched: &[], unmatched: &[], likelihood };
+        let evidence = Evidence::new(&frame, &[]).with_likelihood(likelihood);
         let shown = self.filter.visualise(&evidence).unwrap().unwrap();
         shown.downcast_ref::<Sketch>().unwrap().clone()
     }

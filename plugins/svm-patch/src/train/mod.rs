@@ -74,7 +74,9 @@ impl PatchTrainer {
         let people = self.samples.iter().filter(|s| s.example.is_person).count();
         let groups: std::collections::BTreeSet<u64> =
             self.samples.iter().map(|s| s.example.group).collect();
-        let number = |n: usize| toml::Value::Integer(n as i64);
+        fn number(n: usize) -> toml::Value {
+            toml::Value::Integer(n as i64)
+        }
         let mut figures = toml::Table::new();
         figures.insert("people".into(), number(people));
         figures.insert("others".into(), number(self.samples.len() - people));
@@ -113,7 +115,7 @@ impl Trainer for PatchTrainer {
         progress(1.0);
         let figures = self.figures(&trials, best, &model, fitted);
         let text = model.to_text().map_err(Error::Other)?;
-        Ok(Fitted { model: text, figures, ..Fitted::default() })
+        Ok(Fitted::new(text, figures))
     }
 }
 

@@ -85,12 +85,12 @@ mod tests {
             Example { is_person: k.is_multiple_of(3), group: k as u64 }
         }
 
-        let patch = |k: usize| {
+        fn patch(k: usize) -> Box<[f32; PIXELS]> {
             let mut patch = Box::new([0.0; PIXELS]);
             patch[k] = 1.0;
             patch[(7 * k + 3) % PIXELS] += 0.5;
             patch
-        };
+        }
         let samples: Vec<Sample> =
             (0..24).map(|k| Sample { patch: patch(k), example: example(k) }).collect();
         let of: Vec<&Sample> = samples.iter().collect();

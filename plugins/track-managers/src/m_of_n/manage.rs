@@ -30,7 +30,7 @@ impl MOfN {
 
     /// Returns the test that a candidate fails, or its log-odds.
     fn judge(&mut self, candidate: &Unassociated<'_>) -> std::result::Result<f64, &'static str> {
-        let Unassociated { detection, detector_log_odds, discovered } = *candidate;
+        let Unassociated { detection, detector_log_odds, discovered, .. } = *candidate;
         let start_score = self.config.start_score;
         let log_odds = if discovered {
             self.clutter.add_evidence(detection, &self.config)
@@ -52,7 +52,7 @@ impl MOfN {
     /// Observes all tracks, and returns those that end by themselves.
     fn observe(&mut self, tracks: &[ObservedTrack<'_>]) -> Vec<(TrackId, &'static str)> {
         let mut ends = Vec::new();
-        for ObservedTrack { track, observation } in tracks {
+        for ObservedTrack { track, observation, .. } in tracks {
             let Some(count) = self.counts.get_mut(&track.id) else { continue };
             count.observe(*observation, self.dt_s, &self.config);
             let test = count.end_test(track.unseen_s, &self.config);
@@ -87,7 +87,7 @@ impl TrackManager for MOfN {
     fn manage(&mut self, tracks: &[ObservedTrack<'_>]) -> TrackChanges {
         let ends = self.observe(tracks);
         let health = self.counts.iter().map(|(id, count)| (*id, count.health())).collect();
-        TrackChanges { health, ends }
+        TrackChanges::new(health, ends)
     }
 
     /// The older track takes over the confirmation.

@@ -14,7 +14,7 @@ pub(crate) fn person(x: f64, y: f64) -> Detection {
 }
 
 pub(crate) fn scored(score: f64, detection: Detection) -> Detection {
-    Detection { score, ..detection }
+    detection.with_score(score)
 }
 
 /// A manager with the bookkeeping that the tracker does for it.
@@ -34,25 +34,15 @@ impl Rig {
     fn start(&mut self, score: f64, y: f64) -> TrackId {
         let detection = scored(score, person(3.0, y));
         let id = TrackId(self.started + 1);
-        let new =
-            Unassociated { detection: &detection, detector_log_odds: score, discovered: true };
+        let new = Unassociated::new(&detection, score, true);
         let Initiation::Start(health) = self.manager.initiate(id, &new) else {
             panic!("{score} starts no track")
         };
         self.started += 1;
         let person = Person { position: detection.position, velocity: Vector2::zeros() };
-        let estimate =
-            Estimate { person, covariance: SMatrix::identity(), region: detection.rect().unwrap() };
-        self.tracks.push(Track {
-            id,
-            estimate,
-            seen: true,
-            occluded: false,
-            confirmed: health.confirmed,
-            age: 0,
-            unseen_s: 0.0,
-            score: health.log_odds,
-        });
+        let estimate = Estimate::new(person, SMatrix::identity(), detection.rect().unwrap());
+        self.tracks
+            .push(Track::new(id, estimate, health.log_odds).with_confirmed(health.confirmed));
         id
     }
 
@@ -70,9 +60,8 @@ impl Rig {
 
     fn manage(&mut self, observations: &[Observation]) -> TrackChanges {
         let pairs = self.tracks.iter().zip(observations);
-        let observed: Vec<ObservedTrack<'_>> = pairs
-            .map(|(track, observation)| ObservedTrack { track, observation: *observation })
-            .collect();
+        let observed: Vec<ObservedTrack<'_>> =
+            pairs.map(|(track, observation)| ObservedTrack::new(track, *observation)).collect();
         let changes = self.manager.manage(&observed);
         for (id, health) in &changes.health {
             for track in self.tracks.iter_mut().filter(|track| track.id == *id) {
@@ -212,15 +201,15 @@ fn time_without_a_search_counts_once_there_are_misses() {
 
 #[test]
 fn candidates_are_dropped_by_the_test_that_they_fail() {
-    let test = |score: f64, detector_log_odds: f64, discovered: bool| {
+    fn test(score: f64, detector_log_odds: f64, discovered: bool) -> &'static str {
         let mut manager = MOfN::new(Config { doubt_s: 3.0, ..Config::default() }).unwrap();
         let seen = scored(score, person(3.0, 0.0));
-        let new = Unassociated { detection: &seen, detector_log_odds, discovered };
+        let new = Unassociated::new(&seen, detector_log_odds, discovered);
         match manager.initiate(TrackId(1), &new) {
             Initiation::Start(_) => "started",
             Initiation::Drop(test) => test,
         }
-    };
+    }
     assert_eq!(test(1.0, 1.0, true), "started");
     assert_eq!(test(-1.0, -1.0, true), "score");
     assert_eq!(test(-1.0, 1.0, true), "verifier");
@@ -236,7 +225,7 @@ fn candidates_are_dropped_by_the_test_that_they_fail() {
 fn a_place_that_was_rejected_is_doubted_until_a_reset() {
     fn initiate(manager: &mut MOfN, score: f64) -> Initiation {
         let seen = scored(score, person(3.0, 0.0));
-        let new = Unassociated { detection: &seen, detector_log_odds: 5.0, discovered: true };
+        let new = Unassociated::new(&seen, 5.0, true);
         manager.initiate(TrackId(1), &new)
     }
 

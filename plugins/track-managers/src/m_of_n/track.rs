@@ -29,7 +29,7 @@ impl TrackCount {
     }
 
     pub(crate) fn health(&self) -> TrackHealth {
-        TrackHealth { confirmed: self.confirmed, log_odds: self.score }
+        TrackHealth::new(self.confirmed, self.score)
     }
 
     /// Adds the observation of the track in one frame, `dt_s` after the last one.
@@ -41,7 +41,8 @@ impl TrackCount {
             Observation::Missed => self.miss(dt_s, settings),
             Observation::NotSearched => self.missed_s += dt_s,
             Observation::Occluded => self.clear_misses(),
-            Observation::Started | Observation::OutOfView => {}
+            // `Started`, `OutOfView`, and what a later version adds, are no evidence.
+            _ => {}
         }
     }
 

@@ -62,7 +62,7 @@ impl Evidence {
     }
 
     pub(crate) fn health(&self, config: &Config) -> TrackHealth {
-        TrackHealth { confirmed: self.confirmed, log_odds: self.log_odds(config) }
+        TrackHealth::new(self.confirmed, self.log_odds(config))
     }
 
     /// Returns the log-odds that the track is a person.
@@ -122,7 +122,8 @@ impl Evidence {
                 self.misses = self.misses.saturating_add(1);
             }
             Observation::NotSearched => self.missed_s += dt_s,
-            Observation::Started | Observation::OutOfView => {}
+            // `Started`, `OutOfView`, and what a later version adds, are no evidence.
+            _ => {}
         }
         if track.seen {
             self.add_motion(track, config);

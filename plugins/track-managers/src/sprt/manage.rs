@@ -54,7 +54,7 @@ impl TrackManager for Sprt {
     }
 
     fn initiate(&mut self, id: TrackId, candidate: &Unassociated<'_>) -> Initiation {
-        let Unassociated { detection, detector_log_odds, discovered } = *candidate;
+        let Unassociated { detection, detector_log_odds, discovered, .. } = *candidate;
         let start_log_odds = self.config.start_log_odds;
         if detection.score < start_log_odds {
             let by_detector = detector_log_odds < start_log_odds;
@@ -77,7 +77,7 @@ impl TrackManager for Sprt {
 
     fn manage(&mut self, tracks: &[ObservedTrack<'_>]) -> TrackChanges {
         let mut changes = TrackChanges::default();
-        for ObservedTrack { track, observation } in tracks {
+        for ObservedTrack { track, observation, .. } in tracks {
             let at = track.estimate.person.position.xy();
             let clutter = self.clutter.against(&at, self.config.clutter_m);
             let Some(evidence) = self.evidence.get_mut(&track.id) else { continue };

@@ -37,23 +37,21 @@ impl Scene {
 
     fn offer(&mut self, seen: &Detection) {
         let id = TrackId(self.started + 1);
-        let new = Unassociated { detection: seen, detector_log_odds: seen.score, discovered: true };
+        let new = Unassociated::new(seen, seen.score, true);
         match self.manager.initiate(id, &new) {
             Initiation::Drop(test) => self.dropped.push(test),
             Initiation::Start(health) => {
                 self.started += 1;
                 let person = Person { position: seen.position, velocity: Vector2::zeros() };
                 let covariance = SMatrix::identity() * 0.0025;
-                self.track = Some(Track {
-                    id,
-                    estimate: Estimate { person, covariance, region: seen.rect().unwrap() },
-                    seen: true,
-                    occluded: false,
-                    confirmed: health.confirmed,
-                    age: 0,
-                    unseen_s: 0.0,
-                    score: health.log_odds,
-                });
+                self.track = Some(
+                    Track::new(
+                        id,
+                        Estimate::new(person, covariance, seen.rect().unwrap()),
+                        health.log_odds,
+                    )
+                    .with_confirmed(health.confirmed),
+                );
             }
         }
     }
@@ -80,7 +78,7 @@ impl Scene {
             }
             None => Observation::Missed,
         };
-        let changes = self.manager.manage(&[ObservedTrack { track: &track, observation }]);
+        let changes = self.manager.manage(&[ObservedTrack::new(&track, observation)]);
         (track.confirmed, track.score) =
             (changes.health[0].1.confirmed, changes.health[0].1.log_odds);
         self.confirmed_s += if track.confirmed { DT_S } else { 0.0 };
@@ -169,7 +167,7 @@ fn a_thing_stays_clutter_while_the_robot_drives() {
 fn clutter_is_of_its_place_and_time() {
     fn starts(manager: &mut Sprt, x: f64) -> bool {
         let seen = detection(x, 1.0);
-        let new = Unassociated { detection: &seen, detector_log_odds: 1.0, discovered: true };
+        let new = Unassociated::new(&seen, 1.0, true);
         matches!(manager.initiate(TrackId(9), &new), Initiation::Start(_))
     }
 

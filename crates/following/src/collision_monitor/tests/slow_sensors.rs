@@ -46,8 +46,8 @@ fn reasons(scanned: &Scanned, is_further: bool) -> Vec<Option<Reason>> {
         let here = stamp_of(index);
         let frame = Frame::new(index as u64, here, Arc::new(camera()), motion, images);
         let frame = if is_further {
-            let age_s = here.seconds_since(stamp);
-            let reading = ObstacleReading { age_s, ..reading(stamp, ObstacleData::Scan(scan)) };
+            let mut reading = reading(stamp, ObstacleData::Scan(scan));
+            reading.age_s = here.seconds_since(stamp);
             frame.with_sensor(ObstacleReadings(Arc::new([reading])))
         } else {
             frame.with_laser(Some(scan.with_stamp(stamp)))

@@ -27,7 +27,7 @@ fn new_lock(settings: TargetSettings) -> TargetLock {
 
 fn somebody(id: u32, x: f64, y: f64) -> Track {
     let track = target(x, y, Vector2::zeros());
-    Track { id: TrackId(id), seen: true, confirmed: true, occluded: false, ..track }
+    track.with_id(TrackId(id)).with_seen(true).with_confirmed(true).with_occluded(false)
 }
 
 fn tall(height_m: f64) -> Track {
@@ -49,7 +49,7 @@ fn steps(lock: &mut TargetLock, count: usize, track: &Track) -> Vec<LockState> {
 fn missed(frames: usize) -> (TargetLock, Vec<LockState>) {
     let mut lock = new_lock(settings());
     steps(&mut lock, 20, &tall(1.6));
-    let states = steps(&mut lock, frames, &Track { seen: false, ..tall(1.6) });
+    let states = steps(&mut lock, frames, &tall(1.6).with_seen(false));
     (lock, states)
 }
 
@@ -86,7 +86,7 @@ fn nobody_is_told_apart_from_a_person_who_is_out_of_sight() {
     fn is_known(seen: bool) -> bool {
         let mut lock = new_lock(settings());
         steps(&mut lock, 20, &tall(1.6));
-        step(&mut lock, &[Track { seen, ..tall(1.6) }, somebody(2, 2.0, 1.5)]);
+        step(&mut lock, &[tall(1.6).with_seen(seen), somebody(2, 2.0, 1.5)]);
         lock.others.contains(&TrackId(2))
     }
 
@@ -105,15 +105,15 @@ fn a_blink_is_no_reason_for_doubt() {
 
 #[test]
 fn somebody_who_came_near_may_have_been_taken_for_the_person() {
-    let states = |away_m: f64| {
+    fn states(away_m: f64) -> Vec<LockState> {
         let mut lock = new_lock(settings());
         steps(&mut lock, 20, &tall(1.6));
         let other = somebody(2, 2.0, away_m);
         step(&mut lock, &[tall(1.6), other.clone()]);
-        let gone = Track { seen: false, ..other };
+        let gone = other.with_seen(false);
         let states = (0..9).map(|_| step(&mut lock, &[tall(1.9), gone.clone()]).state);
         states.collect::<Vec<_>>()
-    };
+    }
     assert_eq!(states(0.81), [LockState::Locked; 9]);
     assert!(states(0.79).contains(&LockState::Lost));
 }
@@ -133,7 +133,7 @@ fn in_front_is_what_the_settings_say() {
 
     assert!(at(44.0, 2.0) && at(-44.0, 2.0) && !at(46.0, 2.0) && !at(-46.0, 2.0));
     assert!(at(30.0, 4.9) && !at(30.0, 5.1));
-    assert!(!chosen(Track { confirmed: false, ..somebody(1, 2.0, 0.0) }));
+    assert!(!chosen(somebody(1, 2.0, 0.0).with_confirmed(false)));
     let mut lock = new_lock(settings());
     lock.update(&frame(1, 0.0), &EgoMotion::at_rest(0.1), &[somebody(1, 2.0, 0.0)], &[], false)
         .unwrap();

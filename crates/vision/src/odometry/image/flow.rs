@@ -68,10 +68,10 @@ pub(super) fn whole_shift(from: &[GreyImage], to: &[GreyImage]) -> Vector2<f64> 
 /// Returns the mean difference of the brightness of two images of which the second is shifted, on
 /// the part that both show.
 fn misfit(from: &GreyImage, to: &GreyImage, (dx, dy): (i64, i64)) -> f64 {
-    let both = |shift: i64, side: usize| {
+    fn both(shift: i64, side: usize) -> std::ops::Range<usize> {
         let side = side as i64;
         ((-shift).max(0) as usize)..((side - shift.max(0)).max(0) as usize)
-    };
+    }
     let columns = both(dx, from.width().min(to.width()));
     let there = (columns.start as i64 + dx) as usize..(columns.end as i64 + dx) as usize;
     let rows = both(dy, from.height().min(to.height()));

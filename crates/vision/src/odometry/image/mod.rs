@@ -60,6 +60,7 @@ struct View {
 
 /// Motion of the camera from one frame to the next.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct CameraMoved {
     /// Motion of the robot.
     pub motion: Option<EgoMotion>,

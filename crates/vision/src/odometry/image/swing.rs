@@ -24,6 +24,7 @@ pub type Pair = [Vector2<f64>; 2];
 /// seen by a rotated camera. For a narrow lens and a small rotation it is the similarity transform of
 /// other programs; a pan of a wide lens bends the image, which this model knows.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Swing {
     /// Rotation from the axes of the old camera to those of the new one.
     pub new_from_old: Rotation3<f64>,
@@ -101,6 +102,7 @@ impl Swing {
 
 /// A fitted motion with its uncertainty.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct SwingFit {
     /// The motion.
     pub swing: Swing,

@@ -193,7 +193,7 @@ fn a_person_who_is_known_is_left_out() {
     let position = Point3::new(2.0, 0.0, 1.6);
     let person = Person { position, velocity: Vector2::zeros() };
     let covariance = SMatrix::identity();
-    let known = |region| Estimate { person, covariance, region };
+    let known = |region| Estimate::new(person, covariance, region);
     let shift = |people: &[Estimate]| {
         let settings = OdometrySettings { cell_px: 16, ..OdometrySettings::default() };
         let found = views[0].compared(&views[1], people, &settings);

@@ -227,7 +227,7 @@ fn saturated_wheels_keep_the_curvature() {
 #[test]
 fn somebody_unseen_is_followed_ever_more_slowly_and_then_no_more() {
     fn after(unseen_s: f64) -> WheelSpeeds {
-        let person = Track { seen: false, unseen_s, ..target(4.0, 1.0, Vector2::zeros()) };
+        let person = target(4.0, 1.0, Vector2::zeros()).with_seen(false).with_unseen_s(unseen_s);
         settled(Config::default(), &person)
     }
 

@@ -60,7 +60,7 @@ impl State {
     fn target(&self) -> Option<Track> {
         let [x, y] = self.place;
         let person = target(x, y, Vector2::from(self.velocity));
-        self.is_there.then_some(Track { unseen_s: self.unseen_s, ..person })
+        self.is_there.then_some(person.with_unseen_s(self.unseen_s))
     }
 
     fn motion(&self) -> EgoMotion {

@@ -305,11 +305,7 @@ fn the_region_is_that_of_the_estimated_place() {
 fn settings_that_cannot_work_are_refused() {
     let mut registry = Registry::default();
     crate::ekf::register(&mut registry);
-    let context = Context {
-        seed: 0,
-        base_dir: ".".into(),
-        wheels: DiffDrive { half_separation_m: 0.2, slip: 0.0 },
-    };
+    let context = Context::new(0, ".", DiffDrive { half_separation_m: 0.2, slip: 0.0 });
     assert!(registry.build_filter("ekf", None, &context).is_ok());
     for line in ["acceleration_noise = 0.0", "height_noise = -1.0", "extra_sigma_m = nan"] {
         let text = format!("{{ {line} }}");

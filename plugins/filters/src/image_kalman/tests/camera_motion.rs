@@ -64,8 +64,7 @@ fn a_gap_is_filtered_anew_with_the_cameras_of_its_frames() {
         let motion = EgoMotion::at_rest(DT_S);
         let frame = Frame::new(7, Stamp::default(), camera(), motion, Images::default());
         let matched = [Matched::certain(TrackId(1), &seen)];
-        let evidence =
-            Evidence { frame: &frame, matched: &matched, unmatched: &[], likelihood: None };
+        let evidence = Evidence::new(&frame, &matched);
         filter.update(&evidence).unwrap();
         filter.estimates(&camera())[&TrackId(1)].person.velocity.norm()
     };

@@ -49,22 +49,15 @@ impl Bench {
     fn without_track(config: Config) -> Self {
         let person = Person { position: Point3::origin(), velocity: Vector2::zeros() };
         let covariance = SMatrix::identity() * 1e-4;
-        let track = Track {
-            id: ID,
-            estimate: Estimate { person, covariance, region: Rect::new(0.0, 0.0, 9.0, 9.0) },
-            seen: true,
-            occluded: false,
-            confirmed: false,
-            age: 0,
-            unseen_s: 0.0,
-            score: 0.0,
-        };
+        let track =
+            Track::new(ID, Estimate::new(person, covariance, Rect::new(0.0, 0.0, 9.0, 9.0)), 0.0)
+                .with_confirmed(false);
         Self { manager: Sprt::new(config).unwrap(), track }
     }
 
     fn offer(&mut self, x: f64, log_odds: f64) -> Initiation {
         let seen = detection(x, log_odds);
-        let new = Unassociated { detection: &seen, detector_log_odds: log_odds, discovered: true };
+        let new = Unassociated::new(&seen, log_odds, true);
         self.manager.initiate(ID, &new)
     }
 
@@ -90,7 +83,7 @@ impl Bench {
         self.manager.predict(&EgoMotion::at_rest(dt_s));
         self.track.seen = observation.is_supported();
         self.track.unseen_s = if self.track.seen { 0.0 } else { self.track.unseen_s + dt_s };
-        let changes = self.manager.manage(&[ObservedTrack { track: &self.track, observation }]);
+        let changes = self.manager.manage(&[ObservedTrack::new(&self.track, observation)]);
         let [(_, health)] = changes.health[..] else { panic!("one track: {changes:?}") };
         (self.track.score, self.track.confirmed) = (health.log_odds, health.confirmed);
         changes.ends.first().map(|(_, test)| *test)
@@ -359,7 +352,7 @@ fn candidates_are_dropped_by_the_test_that_speaks_against_them() {
     assert_eq!(manager.start_log_odds(), 0.5);
     let mut offer = |score: f64, detector_log_odds: f64, discovered: bool| {
         let seen = detection(3.0, score);
-        let new = Unassociated { detection: &seen, detector_log_odds, discovered };
+        let new = Unassociated::new(&seen, detector_log_odds, discovered);
         manager.initiate(ID, &new)
     };
     assert_eq!(offer(0.4, 0.4, true), Initiation::Drop("score"));
@@ -415,7 +408,7 @@ fn the_older_of_two_merged_tracks_takes_over_motion_and_confirmation() {
     let config = Config { confirm_log_odds: 10.0, repeated: 1.0, ..looks_only() };
     let mut bench = walked(config);
     let seen = detection(5.0, 2.0);
-    let new = Unassociated { detection: &seen, detector_log_odds: 2.0, discovered: true };
+    let new = Unassociated::new(&seen, 2.0, true);
     bench.manager.initiate(TrackId(2), &new);
     assert_eq!(bench.manager.merge(TrackId(2), TrackId(3)), None);
     let health = bench.manager.merge(TrackId(2), ID).unwrap();
@@ -433,6 +426,6 @@ fn a_stopped_track_is_judged_no_longer() {
     let mut bench = Bench::new(looks_only(), 3.0, 2.0);
     bench.manager.stop(ID);
     let observation = Observation::Missed;
-    let changes = bench.manager.manage(&[ObservedTrack { track: &bench.track, observation }]);
+    let changes = bench.manager.manage(&[ObservedTrack::new(&bench.track, observation)]);
     assert!(changes.health.is_empty() && changes.ends.is_empty());
 }
