@@ -689,6 +689,7 @@ def run(checks, path, domain, port, command):
         viewer = Viewer(listeners)
         threading.Thread(target=robot.play, daemon=True).start()
         http = Http(port)
+        server = None
         if checks == "all":
             converse(domain, http, commands, states, tracks, early)
             viewer.check(tracks)
@@ -698,16 +699,19 @@ def run(checks, path, domain, port, command):
             if checks == "managed":
                 manage(domain, hand, http, commands, tracks)
             elif checks == "nav2":
-                let_nav2_drive(domain, hand, http, commands)
+                server = let_nav2_drive(domain, hand, http, commands)
             else:
                 start_moving(hand, http, commands)
                 repeat_images(robot, http, commands)
+        cancelled = len(server.cancelled) if server else 0
         bridge.send_signal(2)
         bridge.wait(timeout=10)
         check(bridge.returncode == 130, "the bridge ends by the signal")
         time.sleep(0.3)
         last = commands.since(0)[-1]
         check(not moves([last]), "the last command is zero")
+        if server:
+            check(len(server.cancelled) > cancelled, "the goal of Nav2 is cancelled at the end")
         if checks == "all":
             last = viewer.markers.since(0)[-1].markers
             check([m.action for m in last] == [DELETE_ALL], "the last markers remove all people")
@@ -866,11 +870,17 @@ def manage(domain, hand, http, commands, tracks):
     reset_until(hand, http, "not enabled", "reset")
     hand.holds = True
     moves_again(commands, "pressed, the robot moves")
+    to("deactivate", "inactive")
+    to("cleanup", "unconfigured")
+    to("configure", "inactive")
+    to("activate", "active")
+    hand.holds = False
+    start_moving(hand, http, commands)
     then = time.monotonic()
     to("shutdown", "finalized")
     wait_for(lambda: is_silent(commands, then), 3, "zero, and then no command")
     passed = [event.transition.id for event in events.since(0)]
-    wanted = [1, 10, 3, 30, 4, 40, 3, 30, 7, 50]
+    wanted = [1, 10, 3, 30, 4, 40, 3, 30, 4, 40, 2, 20, 1, 10, 3, 30, 7, 50]
     check(passed == wanted, f"each transition is told: {passed}")
 
 
@@ -910,11 +920,55 @@ def let_nav2_drive(domain, hand, http, commands):
         wait_for(lambda: goal()["state"] == "no goal", 5, "which is confirmed")
         check(len(commands.since(then)) > 0, "zeros go out")
     check(server.asked == ["/people/target_pose"] * 2, "the goals are the pose of the target")
+    fail_nav2(server, hand, http, goal, commands)
     hand.holds = True
-    wait_for(lambda: goal()["state"] == "drives", 10, "Nav2 drives")
+    wait_for(lambda: goal()["state"] == "drives", 10, "pressed: Nav2 drives")
+    count = len(server.cancelled)
     hand.switch_off()
-    wait_for(lambda: len(server.cancelled) == 3, 2, "switched off: cancelled")
+    wait_for(lambda: len(server.cancelled) > count, 2, "switched off: cancelled")
+    hand.holds = False
+    reset_until(hand, http, "not enabled", "reset")
+    hand.holds = True
+    wait_for(lambda: goal()["state"] == "drives", 10, "pressed: Nav2 drives")
     check(not moves(commands.since(0)), "the bridge itself moves nothing")
+    return server
+
+
+def fail_nav2(server, hand, http, goal, commands):
+    """The following server refuses, gives up, falls silent, and is deaf."""
+
+    def press(mode):
+        hand.holds = False
+        wait_for(lambda: goal()["state"] == "no goal", 5, "released")
+        server.mode, count = mode, len(server.asked)
+        hand.holds = True
+        wait_for(lambda: len(server.asked) > count, 10, f"pressed: a server that {mode} is asked")
+
+    for mode, reason in (
+        ("refuses", "Nav2 refuses the goal"),
+        ("aborts", "it does not detect the person (902), after 0 retries: no pose"),
+        ("is silent", "no feedback from Nav2"),
+    ):
+        press(mode)
+        wait_for(lambda: goal()["state"] == "goal ended", 6, "the goal ends")
+        check(reason in goal()["reason"], goal()["reason"])
+        count = len(server.asked)
+        time.sleep(1.0)
+        check(len(server.asked) == count, "and no other is given, though the hand holds on")
+    press("obeys")
+    wait_for(lambda: goal()["state"] == "drives", 5, "Nav2 drives")
+    server.mode = "is deaf"
+    hand.holds = False
+    wait_for(lambda: goal()["is_unconfirmed"], 5, "a cancellation is not confirmed")
+    # Longer than zeros go on after one that is.
+    time.sleep(2.5)
+    check(commands.since(time.monotonic() - 0.3), "zeros go on")
+    code, health = http.send("healthz")
+    check(code == 503 and "does not confirm" in health["reason"], f"GET /healthz: {health['reason']}")
+    server.mode = "obeys"
+    wait_for(lambda: goal()["state"] == "no goal", 5, "it is repeated, and confirmed")
+    time.sleep(0.5)
+    check(not commands.since(time.monotonic() - 0.3), "zeros end")
 
 
 def converse(domain, http, commands, states, tracks, early):

@@ -239,7 +239,8 @@ class CancelGoalResponse(IdlStruct, typename="action_msgs::srv::dds_::CancelGoal
     goals_canceling: t.sequence[GoalInfo]
 
 
-CANCELED = 5
+CANCELED, ABORTED = 5, 6
+FAILED_TO_DETECT_OBJECT = 902
 
 
 class FollowingServer:
@@ -258,6 +259,8 @@ class FollowingServer:
         # Topics of the goals, and times of the cancellations.
         self.asked, self.cancelled = [], []
         self.goal, self.waiting = None, None
+        # `obeys`, `refuses`, `aborts` a goal, `is deaf` to cancellations, or `is silent`: no feedback.
+        self.mode = "obeys"
         threading.Thread(target=self.serve, daemon=True).start()
 
     def serve(self):
@@ -266,18 +269,24 @@ class FollowingServer:
             self.take_cancellation()
             for request in taken(self.results[0], GetResultRequest):
                 self.waiting = request
-            if self.goal:
+            if self.mode == "aborts" and self.goal and self.waiting:
+                self.end(ABORTED, FAILED_TO_DETECT_OBJECT, "no pose")
+            if self.goal and self.mode != "is silent":
                 self.feedback.write(FeedbackMessage(self.goal, Feedback(2, Span(1, 0), 0)))
             time.sleep(0.02)
 
     def take_goal(self):
         for request in taken(self.goals[0], SendGoalRequest):
             self.asked.append(request.goal.pose_topic)
-            self.goal = request.goal_id
-            answer = SendGoalResponse(request.guid, request.number, True, Stamp(0, 0))
+            accepted = self.mode != "refuses"
+            if accepted:
+                self.goal = request.goal_id
+            answer = SendGoalResponse(request.guid, request.number, accepted, Stamp(0, 0))
             self.goals[1].write(answer)
 
     def take_cancellation(self):
+        if self.mode == "is deaf":
+            return
         for request in taken(self.cancels[0], CancelGoalRequest):
             is_ours = self.goal and request.goal_info.goal_id.uuid == self.goal.uuid
             infos = [request.goal_info] if is_ours else []
@@ -286,15 +295,16 @@ class FollowingServer:
             )
             if is_ours:
                 self.cancelled.append(time.monotonic())
-                self.goal = None
-                if self.waiting:
-                    result = Result(Span(1, 0), 0, 0, "")
-                    self.results[1].write(
-                        GetResultResponse(
-                            self.waiting.guid, self.waiting.number, CANCELED, result
-                        )
-                    )
-                    self.waiting = None
+                self.end(CANCELED, 0, "")
+
+    def end(self, status, code, message):
+        """Ends the goal, with its result for whoever waits for it."""
+        self.goal = None
+        if self.waiting:
+            guid, number = self.waiting.guid, self.waiting.number
+            result = Result(Span(1, 0), code, 0, message)
+            self.results[1].write(GetResultResponse(guid, number, status, result))
+            self.waiting = None
 
 
 def taken(reader, kind):

@@ -137,12 +137,8 @@ impl Desk {
 
     /// Refuses requests, until [`Desk::open`], in this state of the node.
     pub(crate) fn close(&self, lifecycle: &'static str) {
-        let mut shared = self.lock();
-        shared.is_open = false;
-        shared.lifecycle = lifecycle;
-        // No frame and no turn of an earlier time says how the bridge is now.
-        shared.frame = None;
-        shared.turn = None;
+        // Nothing of an earlier time says how the bridge is now.
+        *self.lock() = Shared { lifecycle, ..Shared::default() };
     }
 
     /// Sets the state of the goal of the following server.
@@ -270,6 +266,8 @@ mod tests {
         desk.close("inactive");
         assert_eq!(desk.ask(Verb::Clear).unwrap_err().reason(), NOT_ACTIVE);
         assert_eq!(desk.health().reason.as_deref(), Some("the node is inactive"));
+        let status = desk.status();
+        assert_eq!((status.permission, status.frames, status.lifecycle), (None, 0, "inactive"));
         desk.close("active");
         let waits = desk.ask(Verb::Clear).unwrap_err();
         assert_eq!(waits.reason(), "the topics of the robot are still waited for");
