@@ -5,7 +5,8 @@
 The log is one of `tagalong simulate`. Its images, calibrations, odometry and tf_static are published in
 real time with stamps of now; one packet in a hundred is lost. tf_static, and a `true` for late readers,
 are published before the bridge starts; the switch, the callers and a second listener come late. CHECK is
-`all`, or `camera` for the faults of the camera alone.
+`all`, `camera` for the faults of the camera alone, `managed` for the states of a managed node, or `nav2`
+for Nav2's following server as the driver.
 """
 
 import json
@@ -34,6 +35,8 @@ from cyclonedds.sub import DataReader  # noqa: E402
 from cyclonedds.topic import Topic  # noqa: E402
 from cyclonedds.util import duration  # noqa: E402
 from mcap.reader import make_reader  # noqa: E402
+
+import dds_nodes as nodes  # noqa: E402
 
 
 @dataclass
@@ -575,6 +578,7 @@ class Viewer:
         self.markers = Listener(participant, "rt/people/markers", MarkerArray)
         self.transforms = Listener(participant, "rt/tf", TFMessage)
         self.people = Listener(participant, "rt/people", People)
+        self.grids = Listener(participant, "rt/people/forecast", nodes.OccupancyGrid)
 
     def check(self, tracks):
         """Checks that markers, transforms and people tell of the same people as the tracks."""
@@ -617,6 +621,26 @@ class Viewer:
         check(all(0.0 < person.reliability <= 1.0 for person in known), "with a reliability")
         speeds = [(p.velocity.x**2 + p.velocity.y**2) ** 0.5 for p in known]
         check(max(speeds) < 3.0, f"and a velocity, at most {max(speeds):.2f} m/s")
+        self.check_forecast(people)
+
+    def check_forecast(self, people):
+        """Checks that the grid of a costmap has people where they are, and what is not seen unknown."""
+        by_stamp = {(m.header.stamp.sec, m.header.stamp.nanosec): m.people for m in people}
+        found = []
+        for grid in self.grids.since(0):
+            stamp = grid.header.stamp
+            found += [(grid, person) for person in by_stamp.get((stamp.sec, stamp.nanosec), [])]
+        check(len(found) > 10, f"nav_msgs/OccupancyGrid with people: {len(found)}")
+        grid = found[-1][0]
+        size = (grid.info.width, grid.info.height, round(grid.info.resolution, 3), len(grid.data))
+        check(size == (120, 120, 0.1, 14400), f"of cells: {size}")
+        check(all(g.header.frame_id == "odom" for g, _ in found), "in the frame odom")
+        values = [g.at(p.position.x, p.position.y) for g, p in found]
+        check(min(values) > 60, f"occupied where people are: at least {min(values)} %")
+        check(all(-1 <= v <= 100 for g, _ in found[-3:] for v in g.data), "from -1 to 100")
+        x, y = grid.info.origin.position.x + 0.5, grid.info.origin.position.y + 6.0
+        check(grid.at(x, y) == -1, "unknown behind the robot")
+        check(0 in grid.data, "and free where nobody comes")
 
 
 class Http:
@@ -665,20 +689,29 @@ def run(checks, path, domain, port, command):
         viewer = Viewer(listeners)
         threading.Thread(target=robot.play, daemon=True).start()
         http = Http(port)
+        server = None
         if checks == "all":
             converse(domain, http, commands, states, tracks, early)
             viewer.check(tracks)
         else:
             early.close()
             hand = Hand(DomainParticipant(domain))
-            start_moving(hand, http, commands)
-            repeat_images(robot, http, commands)
+            if checks == "managed":
+                manage(domain, hand, http, commands, tracks)
+            elif checks == "nav2":
+                server = let_nav2_drive(domain, hand, http, commands)
+            else:
+                start_moving(hand, http, commands)
+                repeat_images(robot, http, commands)
+        cancelled = len(server.cancelled) if server else 0
         bridge.send_signal(2)
         bridge.wait(timeout=10)
         check(bridge.returncode == 130, "the bridge ends by the signal")
         time.sleep(0.3)
         last = commands.since(0)[-1]
         check(not moves([last]), "the last command is zero")
+        if server:
+            check(len(server.cancelled) > cancelled, "the goal of Nav2 is cancelled at the end")
         if checks == "all":
             last = viewer.markers.since(0)[-1].markers
             check([m.action for m in last] == [DELETE_ALL], "the last markers remove all people")
@@ -788,6 +821,154 @@ def contest(domain, hand, http, commands):
     reset_until(hand, http, "not enabled", "the other is gone: reset")
     hand.holds = True
     moves_again(commands, "pressed, the robot moves")
+
+
+def is_silent(commands, then):
+    """Says whether commands ceased after `then`, the last of them zero."""
+    told = commands.since(then)
+    return told and not moves(told[-1:]) and not commands.since(time.monotonic() - 0.4)
+
+
+def manage(domain, hand, http, commands, tracks):
+    """A manager leads the node through its states."""
+    participant = DomainParticipant(domain)
+    get = Caller(
+        participant, "tagalong/get_state", nodes.GetStateRequest, nodes.GetStateResponse
+    )
+    kinds = (nodes.ChangeStateRequest, nodes.ChangeStateResponse)
+    change = Caller(participant, "tagalong/change_state", *kinds)
+    kinds = (nodes.TransitionsRequest, nodes.TransitionsResponse)
+    offered = Caller(participant, "tagalong/get_available_transitions", *kinds)
+    events = Listener(
+        participant, "rt/tagalong/transition_event", nodes.TransitionEvent
+    )
+
+    def state():
+        return get.call(0).current_state.label
+
+    def to(label, wanted):
+        answer = change.call(nodes.Transition(0, label))
+        check(answer.success and state() == wanted, f"{label}: {wanted}")
+
+    check(state() == "unconfigured", "the node waits for a manager")
+    # The first request may be lost, and each counts once: one that is refused is asked until both know.
+    check(not change.call(nodes.Transition(3, "")).success, "which cannot activate it yet")
+    to("configure", "inactive")
+    ids = [d.transition.id for d in offered.call(0).available_transitions]
+    check(ids == [2, 3, 6], f"offered from there: {ids}")
+    time.sleep(1.5)
+    check(not tracks.since(0) and not commands.since(0), "an inactive node publishes nothing")
+    check(http.send("healthz")[1]["reason"] == "the node is inactive", "GET /healthz: inactive")
+    to("activate", "active")
+    start_moving(hand, http, commands)
+    then = time.monotonic()
+    to("deactivate", "inactive")
+    wait_for(lambda: is_silent(commands, then), 3, "zero, and then no command")
+    to("activate", "active")
+    stands(commands, 1.0, "an activation alone moves nothing, though the hand holds on")
+    hand.holds = False
+    reset_until(hand, http, "not enabled", "reset")
+    hand.holds = True
+    moves_again(commands, "pressed, the robot moves")
+    to("deactivate", "inactive")
+    to("cleanup", "unconfigured")
+    to("configure", "inactive")
+    to("activate", "active")
+    hand.holds = False
+    start_moving(hand, http, commands)
+    then = time.monotonic()
+    to("shutdown", "finalized")
+    wait_for(lambda: is_silent(commands, then), 3, "zero, and then no command")
+    passed = [event.transition.id for event in events.since(0)]
+    wanted = [1, 10, 3, 30, 4, 40, 3, 30, 4, 40, 2, 20, 1, 10, 3, 30, 7, 50]
+    check(passed == wanted, f"each transition is told: {passed}")
+
+
+def let_nav2_drive(domain, hand, http, commands):
+    """Nav2's following server has a goal while the hand holds the switch."""
+    participant = DomainParticipant(domain)
+
+    def reader(topic, kind):
+        return DataReader(participant, Topic(participant, topic, kind), qos=reliable())
+
+    def writer(topic, kind):
+        return DataWriter(participant, Topic(participant, topic, kind), qos=reliable())
+
+    server = nodes.FollowingServer(reader, writer)
+
+    def goal():
+        return http.send("status")[1]["nav2"]
+
+    wait_for(http.is_open, 30, "the HTTP server answers")
+    wait_for(lambda: http.send("status")[1]["frames"] > 5, 30, "frames come")
+    wait_for(goal, 20, "the action FollowObject is found")
+    reset_until(hand, http, "not enabled", "reset, Nav2 waits for the switch")
+    check(not server.asked, "no goal before a press")
+    for turn in range(2):
+        hand.holds = True
+        wait_for(lambda: len(server.asked) == turn + 1, 10, "pressed: it has a goal")
+        wait_for(lambda: goal()["state"] == "drives", 5, "Nav2 drives")
+        time.sleep(0.3)
+        then = time.monotonic()
+        time.sleep(0.7)
+        check(not commands.since(then), "and nobody else")
+        then = time.monotonic()
+        hand.holds = False
+        wait_for(lambda: len(server.cancelled) == turn + 1, 5, "released: cancelled")
+        late = server.cancelled[-1] - then
+        check(late < 1.0, f"after {late:.2f} s, of which an enable holds 0.5")
+        wait_for(lambda: goal()["state"] == "no goal", 5, "which is confirmed")
+        check(len(commands.since(then)) > 0, "zeros go out")
+    check(server.asked == ["/people/target_pose"] * 2, "the goals are the pose of the target")
+    fail_nav2(server, hand, http, goal, commands)
+    hand.holds = True
+    wait_for(lambda: goal()["state"] == "drives", 10, "pressed: Nav2 drives")
+    count = len(server.cancelled)
+    hand.switch_off()
+    wait_for(lambda: len(server.cancelled) > count, 2, "switched off: cancelled")
+    hand.holds = False
+    reset_until(hand, http, "not enabled", "reset")
+    hand.holds = True
+    wait_for(lambda: goal()["state"] == "drives", 10, "pressed: Nav2 drives")
+    check(not moves(commands.since(0)), "the bridge itself moves nothing")
+    return server
+
+
+def fail_nav2(server, hand, http, goal, commands):
+    """The following server refuses, gives up, falls silent, and is deaf."""
+
+    def press(mode):
+        hand.holds = False
+        wait_for(lambda: goal()["state"] == "no goal", 5, "released")
+        server.mode, count = mode, len(server.asked)
+        hand.holds = True
+        wait_for(lambda: len(server.asked) > count, 10, f"pressed: a server that {mode} is asked")
+
+    for mode, reason in (
+        ("refuses", "Nav2 refuses the goal"),
+        ("aborts", "it does not detect the person (902), after 0 retries: no pose"),
+        ("is silent", "no feedback from Nav2"),
+    ):
+        press(mode)
+        wait_for(lambda: goal()["state"] == "goal ended", 6, "the goal ends")
+        check(reason in goal()["reason"], goal()["reason"])
+        count = len(server.asked)
+        time.sleep(1.0)
+        check(len(server.asked) == count, "and no other is given, though the hand holds on")
+    press("obeys")
+    wait_for(lambda: goal()["state"] == "drives", 5, "Nav2 drives")
+    server.mode = "is deaf"
+    hand.holds = False
+    wait_for(lambda: goal()["is_unconfirmed"], 5, "a cancellation is not confirmed")
+    # Longer than zeros go on after one that is.
+    time.sleep(2.5)
+    check(commands.since(time.monotonic() - 0.3), "zeros go on")
+    code, health = http.send("healthz")
+    check(code == 503 and "does not confirm" in health["reason"], f"GET /healthz: {health['reason']}")
+    server.mode = "obeys"
+    wait_for(lambda: goal()["state"] == "no goal", 5, "it is repeated, and confirmed")
+    time.sleep(0.5)
+    check(not commands.since(time.monotonic() - 0.3), "zeros end")
 
 
 def converse(domain, http, commands, states, tracks, early):

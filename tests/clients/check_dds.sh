@@ -57,3 +57,5 @@ check() {
 check all "$domain"
 check camera $((domain + 1))
 check camera $((domain + 2)) --clock arrival
+check managed $((domain + 3)) --lifecycle
+check nav2 $((domain + 4)) --follow-object

@@ -1,45 +1,39 @@
-use std::collections::BTreeMap;
-use std::fmt;
-use std::net::SocketAddr;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
-use tagalong::config::Registry;
 use tagalong::core::Stamp;
 use tagalong::log::msgs::Header;
 use tagalong::log::write::FrameRecord;
-use tagalong::log::{Input, Listening, LiveSource, LogFrame};
+use tagalong::log::{LiveSource, LogFrame};
 use tagalong::pipeline::{Enable, EnableSwitch, FrameReport, Permission, Pipeline};
 use tagalong_view::Live;
 
 use crate::diagnostics::{Diagnostics, Status};
-use crate::http::HttpServer;
-use crate::inbox::{Arrival, Inbox, Traffic};
+use crate::inbox::{Arrival, Inbox};
 use crate::messages::SpeedLimit;
+use crate::nav2::Follower;
 use crate::network::{Ear, Network};
 use crate::options::Setup;
 use crate::publishers::{Gate, Origin};
 use crate::services;
 use crate::skill::{Desk, Request, Verb};
 use crate::stamps::{StampClock, system_time};
-use crate::wheels::{CommandCounts, Wheels};
+use crate::summary::Summary;
+use crate::wheels::{CommandCounts, SwitchHandle, Wheels};
 use crate::{BridgeError, Options};
 
+mod nav2;
 mod out;
 mod wheels;
 
 use out::Out;
-use wheels::{drive, sources, take_enable, tell_untimely};
+use wheels::{drive, take_enable, tell_untimely};
 
-/// Longest wait for messages before the stop flag is checked.
-const TURN: Duration = Duration::from_millis(50);
-/// Time between two attempts to start.
-const ATTEMPT: Duration = Duration::from_millis(500);
-/// Time to wait for other topics after the first image: not every pipeline requires odometry and
-/// transforms, but each is better with them.
-const GATHER: Duration = Duration::from_secs(2);
+pub(crate) use wheels::sources;
+
+/// Longest wait for messages before the end is checked.
+pub(crate) const TURN: Duration = Duration::from_millis(50);
 /// Time without a frame after which a message is logged.
 const SILENCE: Duration = Duration::from_secs(2);
 /// Least time between two heartbeats, and between two looks for other publishers.
@@ -49,182 +43,8 @@ const CONTESTED: &str = "more than one publisher of the enable";
 /// Age on arrival above which a frame indicates clocks that disagree, s.
 const OLD_S: f64 = 0.5;
 
-/// Result of a run.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Summary {
-    /// Frames that the pipeline processed.
-    pub frames: u64,
-    /// Message counts by topic.
-    pub traffic: BTreeMap<String, Traffic>,
-    /// Skipped and lost inputs of the frame source, by name.
-    pub counters: BTreeMap<&'static str, u64>,
-    /// Commands sent to the wheels.
-    pub told: CommandCounts,
-}
-
-impl fmt::Display for Summary {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{} frames", self.frames)?;
-        if let CommandCounts { commands, zeros } = self.told
-            && commands > 0
-        {
-            writeln!(f, "{commands} commands, {zeros} of them zero")?;
-        }
-        for (topic, Traffic { received, dropped, malformed }) in &self.traffic {
-            write!(f, "  {topic}: {received} received, {dropped} dropped unread")?;
-            match malformed {
-                0 => writeln!(f)?,
-                _ => writeln!(f, ", {malformed} malformed")?,
-            }
-        }
-        self.counters.iter().try_for_each(|(name, count)| writeln!(f, "  {name}: {count}"))
-    }
-}
-
-/// Runs the bridge until `stop` is set, with the plugins of the catalog. `tell` receives log
-/// messages.
-///
-/// # Errors
-/// [`BridgeError`]. The robot is told to stop in any case.
-pub fn run(
-    options: &Options,
-    stop: &AtomicBool,
-    tell: &dyn Fn(&str),
-) -> Result<Summary, BridgeError> {
-    let registry = tagalong::builtin_registry();
-    run_with(options, &registry, stop, tell)
-}
-
-/// Runs the bridge as [`run`], with these plugins.
-///
-/// # Errors
-/// [`BridgeError`]. The robot is told to stop in any case.
-pub fn run_with(
-    options: &Options,
-    registry: &Registry,
-    stop: &AtomicBool,
-    tell: &dyn Fn(&str),
-) -> Result<Summary, BridgeError> {
-    let setup = options.setup(registry)?;
-    // Before the network, so that a port that is taken ends the program at once.
-    let live = options.serve.map(|at| serve(at, options, &setup, registry, tell)).transpose()?;
-    let (desk, requests) = Desk::new();
-    // Before the topics are there, so that a supervisor can ask how the bridge is.
-    let http = options.http.map(|address| HttpServer::start(address, desk.clone())).transpose()?;
-    if let Some(http) = &http {
-        tell(&format!("answers at {}", http.address()));
-    }
-    let mut network = Network::join(options.domain, &options.namespace)?;
-    let inbox = Arc::new(Inbox::default());
-    let clock = Arc::new(StampClock::new(options.clock));
-    let started = start(options, &setup, &mut network, &inbox, &clock, stop, tell)?;
-    let Some((source, ears)) = started else { return Ok(Summary::default()) };
-    let callers = Callers { desk, requests };
-    let mut bridge = Bridge::new(options, setup, source, network, inbox, clock, callers)?;
-    bridge.live = live;
-    let switch = bridge.listen_to_switch()?;
-    let services = bridge.offer_services()?;
-    bridge.tell_topics(tell);
-    let ended = bridge.work(stop, tell);
-    // The robot is stopped before the node leaves the network.
-    let live = bridge.live.take();
-    let (summary, network) = bridge.finish();
-    if let Some(live) = live {
-        live.finish("The bridge has ended.");
-    }
-    drop((ears, switch, services, http));
-    drop(network);
-    ended.map(|()| summary)
-}
-
-/// Begins to serve the page of what happens now.
-fn serve(
-    at: SocketAddr,
-    options: &Options,
-    setup: &Setup,
-    registry: &Registry,
-    tell: &dyn Fn(&str),
-) -> Result<Live, BridgeError> {
-    let config = setup.pipeline.config().values();
-    let name = options.config.file_stem().unwrap_or_default().to_string_lossy();
-    let input = format!("ROS domain {}", options.domain);
-    let live = Live::start(at, &name, &input, config, registry);
-    let live = live.map_err(|error| BridgeError::Serve(at, error))?;
-    tell(&format!(
-        "live: open {} in a browser; whoever has this address sees the page",
-        live.address()
-    ));
-    Ok(live)
-}
-
-/// Listens until all inputs of the pipeline are there; returns `None` if stopped before.
-fn start(
-    options: &Options,
-    setup: &Setup,
-    network: &mut Network,
-    inbox: &Arc<Inbox>,
-    clock: &Arc<StampClock>,
-    stop: &AtomicBool,
-    tell: &dyn Fn(&str),
-) -> Result<Option<(LiveSource, Vec<Ear>)>, BridgeError> {
-    let name = format!("ROS domain {}", options.domain);
-    let inputs = setup.pipeline.inputs();
-    // The page shows colour, whether or not the pipeline uses it.
-    let inputs = if options.serve.is_some() { inputs.accept(Input::Colour) } else { inputs };
-    let mut listening = Listening::new(&name, &setup.input, &setup.limits, inputs)?;
-    let mut ears: Vec<Ear> = Vec::new();
-    let further = setup.pipeline.obstacle_sources();
-    let is_source = |topic: &str| further.iter().any(|source| source.topic == topic);
-    let deadline = Instant::now() + Duration::from_secs_f64(options.wait);
-    let mut attempt = Instant::now() + ATTEMPT;
-    let mut first: Option<Instant> = None;
-    tell(&format!("listening to {name}"));
-    while !stop.load(Ordering::Relaxed) {
-        for (topic, kind) in network.topics() {
-            if listening.announce(&topic, &kind) && listening.wants(&topic) {
-                let ear = match network.listen(&topic, &kind, inbox, clock)? {
-                    None if is_source(&topic) => Some(network.listen_raw(&topic, &kind, inbox)?),
-                    ear => ear,
-                };
-                ears.extend(ear);
-            }
-        }
-        for Arrival { topic, message, .. } in inbox.take(TURN) {
-            listening.take(&topic, &message);
-        }
-        if first.is_none() && listening.has_image() {
-            first = Some(Instant::now());
-        }
-        if Instant::now() < attempt {
-            continue;
-        }
-        attempt = Instant::now() + ATTEMPT;
-        let is_late = Instant::now() > deadline;
-        let gathered = first.is_some_and(|first| first.elapsed() > GATHER);
-        let started = listening.start().map_err(BridgeError::from).and_then(|source| {
-            // Odometry and a laser may come later than the images.
-            setup.pipeline.check_sources(sources(&source))?;
-            Ok(source)
-        });
-        // Frames may be made of scans alone.
-        if started.is_ok() {
-            first.get_or_insert_with(Instant::now);
-        }
-        match started {
-            Ok(source) if gathered || is_late => {
-                // Topics that the pipeline does not use are no longer received.
-                ears.retain(|ear| source.topics().any(|topic| topic == ear.topic()));
-                return Ok(Some((source, ears)));
-            }
-            Err(missing) if is_late => return Err(missing),
-            _ => {}
-        }
-    }
-    Ok(None)
-}
-
 /// A pipeline between input and output topics.
-struct Bridge {
+pub(crate) struct Bridge {
     network: Network,
     options: Options,
     diagnostics: Diagnostics,
@@ -233,6 +53,9 @@ struct Bridge {
     source: LiveSource,
     inbox: Arc<Inbox>,
     clock: Arc<StampClock>,
+    /// Client of Nav2's following server, once that is found. Before the wheels, so that its goal ends
+    /// before their last commands.
+    follower: Option<Follower>,
     wheels: Option<Wheels>,
     gates: Gates,
     callers: Callers,
@@ -255,12 +78,23 @@ struct Bridge {
     quiet: bool,
     /// True while frames have older stamps than those before.
     went_back: bool,
+    /// True if the action of Nav2 cannot be used.
+    is_refused: bool,
 }
 
 /// Desk of the skill, and the requests that were left there.
-struct Callers {
-    desk: Desk,
-    requests: Receiver<Request>,
+pub(crate) struct Callers {
+    pub(crate) desk: Desk,
+    pub(crate) requests: Receiver<Request>,
+}
+
+/// What outlives a bridge, for the next one.
+pub(crate) struct Surroundings {
+    pub(crate) network: Network,
+    pub(crate) inbox: Arc<Inbox>,
+    pub(crate) clock: Arc<StampClock>,
+    pub(crate) callers: Callers,
+    pub(crate) live: Option<Live>,
 }
 
 /// Gates of the topics of the switch.
@@ -277,15 +111,13 @@ impl Gates {
 }
 
 impl Bridge {
-    fn new(
+    pub(crate) fn new(
         options: &Options,
         setup: Setup,
         source: LiveSource,
-        mut network: Network,
-        inbox: Arc<Inbox>,
-        clock: Arc<StampClock>,
-        callers: Callers,
+        surroundings: Surroundings,
     ) -> Result<Self, BridgeError> {
+        let Surroundings { mut network, inbox, clock, callers, live } = surroundings;
         let base_frame = source.facts().robot_frame;
         let out = Out::new(options, &mut network)?;
         let switch = setup.pipeline.enable_switch();
@@ -304,7 +136,8 @@ impl Bridge {
             network,
             options: options.clone(),
             diagnostics,
-            live: None,
+            live,
+            follower: None,
             pipeline: setup.pipeline,
             source,
             inbox,
@@ -324,20 +157,22 @@ impl Bridge {
             heard: Instant::now(),
             quiet: false,
             went_back: false,
+            is_refused: false,
         })
     }
 
-    fn tell_topics(&self, tell: &dyn Fn(&str)) {
+    pub(crate) fn tell_topics(&self, tell: &dyn Fn(&str)) {
         let topics: Vec<_> = self.source.topics().collect();
         tell(&format!("reads {}", topics.join(", ")));
         if self.wheels.is_none() {
             tell("the config has no controller: no commands");
         }
+        self.tell_action(tell);
     }
 
     /// Listens to the topics that let the robot move, stop it, and reset it; not without a
     /// controller.
-    fn listen_to_switch(&mut self) -> Result<Vec<Ear>, BridgeError> {
+    pub(crate) fn listen_to_switch(&mut self) -> Result<Vec<Ear>, BridgeError> {
         let Some(wheels) = &self.wheels else { return Ok(Vec::new()) };
         let Options { enable, reset, .. } = &self.options;
         let inbox = &self.inbox;
@@ -371,16 +206,45 @@ impl Bridge {
     }
 
     /// Offers the verbs of the skill as services; not without a controller.
-    fn offer_services(&mut self) -> Result<Vec<Ear>, BridgeError> {
+    pub(crate) fn offer_services(&mut self) -> Result<Vec<Ear>, BridgeError> {
         if self.wheels.is_none() {
             return Ok(Vec::new());
         }
         services::offer(&mut self.network, self.options.rmw, &self.callers.desk)
     }
 
-    fn work(&mut self, stop: &AtomicBool, tell: &dyn Fn(&str)) -> Result<(), BridgeError> {
+    /// Returns the switch of the wheels, if there are some.
+    pub(crate) fn switch(&self) -> Option<SwitchHandle> {
+        self.wheels.as_ref().map(Wheels::switch)
+    }
+
+    /// Notes that the node is not active; its switch is latched by then.
+    pub(crate) fn rest(&mut self) {
+        self.diagnostics.rest();
+        self.out.clear();
+        // A robot that is activated again says anew what it needs.
+        self.told = None;
+    }
+
+    /// Prepares for work after a rest.
+    pub(crate) fn resume(&mut self) {
+        // What came in the meantime is old.
+        drop(self.inbox.take(Duration::ZERO));
+        if let Some(switch) = self.switch() {
+            switch.resume();
+        }
+    }
+
+    /// Processes frames until `is_over`.
+    pub(crate) fn work(
+        &mut self,
+        is_over: &dyn Fn() -> bool,
+        tell: &dyn Fn(&str),
+    ) -> Result<(), BridgeError> {
         self.callers.desk.open();
-        while !stop.load(Ordering::Relaxed) {
+        // Silence before the work is none.
+        (self.heard, self.quiet) = (Instant::now(), false);
+        while !is_over() {
             for Arrival { topic, arrival_ns, message } in self.inbox.take(TURN) {
                 match topic {
                     topic if topic == self.options.reset => self.reset(&message, tell),
@@ -442,6 +306,7 @@ impl Bridge {
         self.noted = self.source.notes().len();
         if self.wheels.is_some() {
             self.look_at_publishers(tell);
+            self.look_at_follower(tell);
         }
         let permission = self.wheels.as_ref().map(|wheels| wheels.switch().permission());
         if let Some(permission) = permission.filter(|now| Some(*now) != self.told) {
@@ -461,6 +326,8 @@ impl Bridge {
             enable_publishers: self.gates.enable.discovered(),
             untimely: self.gates.enable.untimely() + self.gates.reset.untimely(),
             malformed: self.inbox.traffic().values().map(|topic| topic.malformed).sum(),
+            is_resting: false,
+            driver: self.driver_state(),
         });
     }
 
@@ -498,6 +365,8 @@ impl Bridge {
         }
         tell_untimely(&self.gates.enable, "`true`", enable, tell);
         tell_untimely(&self.gates.reset, "message", reset, tell);
+        // Nav2 drives where it is told to follow.
+        let rivals = if self.options.follow_object.is_some() { 0 } else { rivals };
         if rivals > self.rivals {
             tell(&format!(
                 "{rivals} other publishers of commands on {command}: two drivers at one wheel; let one \
@@ -536,10 +405,10 @@ impl Bridge {
             self.disarm("odometry jumped", tell);
         }
         self.diagnostics.begin_frame();
-        let is_driving = self
-            .wheels
-            .as_ref()
-            .is_some_and(|wheels| wheels.switch().permission().is_granted() && !found.odom_stale);
+        // The commands of Nav2 are not those that the base should execute by the pipeline.
+        let is_driving = self.options.follow_object.is_none()
+            && self.switch().is_some_and(|switch| switch.permission().is_granted())
+            && !found.odom_stale;
         self.pipeline.set_driving(is_driving);
         let known = self.pipeline.fault();
         let report = self.pipeline.step(&found.frame);
@@ -551,7 +420,12 @@ impl Bridge {
         // Returned only now, so that the wheels hear of a failed step.
         let report = report?;
         self.frames += 1;
-        self.callers.desk.frame(self.pipeline.status(), self.frames);
+        let status = self.pipeline.status();
+        if let Some(follower) = &self.follower {
+            let follows = status.as_ref().is_some_and(|status| status.follows);
+            follower.note_frame(follows && !found.odom_stale && self.pipeline.fault().is_none());
+        }
+        self.callers.desk.frame(status, self.frames);
         self.publish(&found, &report);
         if let Some(live) = &self.live {
             live.offer(&found.frame, &found.odom_from_robot, &report);
@@ -561,6 +435,8 @@ impl Bridge {
 
     fn obey(&self, may_move: bool) {
         if let Some(wheels) = &self.wheels {
+            // Where Nav2 drives, this program says nothing but a stop.
+            let may_move = may_move && self.options.follow_object.is_none();
             wheels.obey(self.pipeline.orders().filter(|_| may_move));
         }
     }
@@ -580,7 +456,7 @@ impl Bridge {
             target: report.target,
             command: report.command.map(|command| command.wheels),
         };
-        self.out.publish(&record, report, &self.base_frame, world);
+        self.out.publish(&found.frame, &record, report, &self.base_frame, world);
     }
 
     /// Clears stops and faults that are not newer than the message; not while the enable has more than
@@ -672,11 +548,16 @@ impl Bridge {
         }
     }
 
-    /// Stops the robot; returns the counts and the network, which must outlast the last command.
-    fn finish(self) -> (Summary, Network) {
+    /// Stops the robot; returns the counts and what outlives the bridge, such as the network, which
+    /// must outlast the last command.
+    pub(crate) fn finish(mut self) -> (Summary, Surroundings) {
+        // Its goal is cancelled while the wheels still send zeros.
+        self.follower.take();
         self.out.clear();
         let summary = self.summary();
         let told = self.wheels.map(Wheels::finish).unwrap_or_default();
-        (Summary { told, ..summary }, self.network)
+        let Self { network, inbox, clock, callers, live, .. } = self;
+        let surroundings = Surroundings { network, inbox, clock, callers, live };
+        (Summary { told, ..summary }, surroundings)
     }
 }

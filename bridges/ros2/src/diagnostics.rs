@@ -45,6 +45,21 @@ pub(crate) struct Status {
     pub(crate) untimely: u64,
     /// Messages that could not be decoded.
     pub(crate) malformed: u64,
+    /// True while the node is not active.
+    pub(crate) is_resting: bool,
+    /// State of Nav2's following server, if that drives.
+    pub(crate) driver: Option<DriverState>,
+}
+
+/// State of Nav2's following server.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum DriverState {
+    /// It is not on the network.
+    Missing,
+    /// It does not confirm that it ends the goal.
+    Unconfirmed,
+    /// State of the goal in words.
+    Goal(&'static str),
 }
 
 /// Publisher of the diagnostics; it ends when it is dropped.
@@ -84,6 +99,14 @@ impl Diagnostics {
         *self.status.lock().unwrap_or_else(PoisonError::into_inner) = Some(status);
     }
 
+    /// Notes that the node is not active.
+    pub(crate) fn rest(&self) {
+        if let Some(status) = &mut *self.status.lock().unwrap_or_else(PoisonError::into_inner) {
+            status.is_resting = true;
+            status.frame_since = None;
+        }
+    }
+
     /// Notes that a frame goes into the pipeline.
     pub(crate) fn begin_frame(&self) {
         if let Some(status) = &mut *self.status.lock().unwrap_or_else(PoisonError::into_inner) {
@@ -112,6 +135,7 @@ impl Status {
             values: vec![
                 value("frames", self.frames.to_string()),
                 value("enable", self.permission.map_or("no controller", Permission::cause).into()),
+                value("driver", self.driver_name().into()),
                 value("other publishers of commands", self.rivals.to_string()),
                 value("publishers of the enable", self.enable_publishers.to_string()),
                 value("enables and resets too old or ahead", self.untimely.to_string()),
@@ -120,7 +144,22 @@ impl Status {
         }
     }
 
+    fn driver_name(&self) -> &'static str {
+        match self.driver {
+            None => "this node",
+            Some(DriverState::Missing) => "Nav2: missing",
+            Some(DriverState::Unconfirmed) => "Nav2: does not confirm that it stops",
+            Some(DriverState::Goal(state)) => state,
+        }
+    }
+
     fn worst(&self, now: Instant) -> (u8, String) {
+        if self.is_resting {
+            return (OK, "the node is not active".into());
+        }
+        if self.driver == Some(DriverState::Unconfirmed) {
+            return (ERROR, "Nav2 does not confirm that it stops".into());
+        }
         let stuck_s = self.frame_since.map_or(Duration::ZERO, |since| now - since);
         if stuck_s > STUCK {
             return (ERROR, format!("one frame takes {:.1} s", stuck_s.as_secs_f64()));
@@ -138,6 +177,9 @@ impl Status {
         match self.permission {
             _ if self.rivals > 0 => (WARN, "other nodes publish commands".into()),
             Some(Permission::Latched(cause)) => (WARN, cause.into()),
+            _ if self.driver == Some(DriverState::Missing) => {
+                (WARN, "no following server of Nav2".into())
+            }
             _ if self.malformed > 0 => (WARN, "messages that do not decode".into()),
             Some(permission) => (OK, permission.cause().into()),
             None => (OK, "tracks people".into()),
@@ -162,6 +204,8 @@ mod tests {
             enable_publishers: 1,
             untimely: 0,
             malformed: 0,
+            is_resting: false,
+            driver: None,
         };
         let worst = |status: Status| status.worst(now + Duration::from_secs(1));
         assert_eq!(worst(well), (OK, "enabled".into()));
@@ -175,6 +219,15 @@ mod tests {
         assert_eq!(late.0, STALE);
         let fault = Status { fault: Some("odometry jumped"), permission: latched, ..well };
         assert_eq!(worst(fault), (ERROR, "fault: odometry jumped".into()));
+        let missing = Status { driver: Some(DriverState::Missing), ..well };
+        assert_eq!(worst(missing), (WARN, "no following server of Nav2".into()));
+        let unconfirmed = Status { driver: Some(DriverState::Unconfirmed), ..fault };
+        assert_eq!(worst(unconfirmed), (ERROR, "Nav2 does not confirm that it stops".into()));
+        assert_eq!(
+            worst(Status { is_resting: true, ..fault }).0,
+            OK,
+            "an inactive node is not ill"
+        );
         let stuck = Status { frame_since: Some(now), ..well };
         assert_eq!(stuck.worst(now + Duration::from_millis(501)).0, ERROR);
         assert_eq!(

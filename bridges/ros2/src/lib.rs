@@ -17,6 +17,8 @@
 //!   a frame therefore stops the robot too. The topics that enable and stop reach this thread
 //!   directly.
 //!
+//! * With `--follow-object`, one gives Nav2's following server its goal, and cancels it.
+//! * Those of the services of a managed node stop the robot before the node leaves the active state.
 //! * One publishes diagnostics every second, also while a frame takes long.
 //! * With `--serve`, some answer browsers from the newest frame; no frame waits for them.
 //!
@@ -27,23 +29,31 @@
 
 mod bridge;
 mod diagnostics;
+mod forecast;
 mod http;
 pub mod inbox;
+mod lifecycle;
+mod listen;
 mod messages;
+mod nav2;
 mod network;
 mod options;
 mod publishers;
 mod raw;
+mod run;
 mod services;
 mod skill;
 mod stamps;
+mod summary;
 mod threads;
 pub mod wheels;
 
-pub use bridge::{Summary, run, run_with};
+pub use forecast::ForecastFrame;
 pub use options::{CommandType, Options};
+pub use run::{run, run_with};
 pub use services::Middleware;
 pub use stamps::ClockSource;
+pub use summary::Summary;
 
 /// Failure to start or to continue the bridge.
 #[derive(Debug, thiserror::Error)]

@@ -6,11 +6,13 @@ use std::thread::JoinHandle;
 use futures::StreamExt;
 use futures::executor::block_on;
 use futures::future::{AbortHandle, Abortable, ready};
+use ros2_client::action::{ActionClient, ActionClientQosPolicies};
 use ros2_client::dds::rustdds::{QosPolicies, RTPSEntity};
-use ros2_client::qos::{History, WhenFull};
+use ros2_client::qos::{Durability, History, WhenFull};
 use ros2_client::{
-    Context, ContextOptions, Gid, MessageInfo, MessageTypeName, Name, Node, NodeName, NodeOptions,
-    Publisher, QosProfile, Server, ServiceMapping, ServiceTypeName, Subscription,
+    ActionTypeName, Context, ContextOptions, Gid, MessageInfo, MessageTypeName, Name, Node,
+    NodeName, NodeOptions, Publisher, QosProfile, Server, ServiceMapping, ServiceTypeName,
+    Subscription,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -30,6 +32,8 @@ use crate::{BridgeError, threads};
 
 /// Number of answers of a service that are kept for callers that missed them.
 const ANSWERS: usize = 10;
+/// Number of events that are kept for subscribers that missed them.
+const EVENTS: usize = 16;
 
 /// The node of the bridge.
 pub(crate) struct Network {
@@ -76,9 +80,7 @@ fn sensor(depth: usize) -> QosProfile {
 
 /// Returns a profile that also receives messages sent before the subscription.
 fn latched() -> QosProfile {
-    sensor(OTHERS)
-        .reliability_reliable(WhenFull::DEFAULT)
-        .durability(ros2_client::qos::Durability::TransientLocal)
+    sensor(OTHERS).reliability_reliable(WhenFull::DEFAULT).durability(Durability::TransientLocal)
 }
 
 /// Returns the profile of the topics that let the robot move and stop it: all messages arrive, and
@@ -263,6 +265,49 @@ impl Network {
         })
     }
 
+    /// Returns the package of the type of an action, if a server of it is on the network.
+    pub(crate) fn action_package(&self, action: &str) -> Option<String> {
+        let feedback = format!("rt{}/_action/feedback", full_name(self.node.namespace(), action));
+        let writers = self.context.domain_participant().discovered_writers();
+        let mut types = writers.into_iter().filter_map(|writer| {
+            let topic = writer.publication_topic_data;
+            (topic.topic_name == feedback).then_some(topic.type_name)
+        });
+        let package = types.next()?.split_once("::action::")?.0.to_owned();
+        Some(package)
+    }
+
+    /// Creates the client of an action.
+    pub(crate) fn action_client<G, R, F>(
+        &mut self,
+        action: &str,
+        package: &str,
+        kind: &str,
+        mapping: ServiceMapping,
+    ) -> Result<ActionClient<G, R, F>, BridgeError>
+    where
+        G: ros2_client::Message + Clone + 'static,
+        R: ros2_client::Message + Clone + 'static,
+        F: ros2_client::Message + 'static,
+    {
+        let name = name(self.node.namespace(), action)?;
+        let answers = commands().history(History::KeepLast { depth: ANSWERS });
+        let qos = ActionClientQosPolicies {
+            goal_service: answers.clone(),
+            result_service: answers.clone(),
+            cancel_service: answers.clone(),
+            feedback_subscription: answers,
+            status_subscription: latched(),
+        };
+        let kind = ActionTypeName::new(package, kind);
+        self.node.create_action_client(mapping, &name, &kind, qos).map_err(failed)
+    }
+
+    /// Returns the full name of a topic.
+    pub(crate) fn full_name(&self, topic: &str) -> String {
+        full_name(self.node.namespace(), topic)
+    }
+
     /// Puts messages of which frames can be made into the inbox: images, and the scans and points of a
     /// pipeline without a camera. Their stamps set the clock.
     fn frames<M: FrameMessage>(
@@ -374,8 +419,35 @@ impl Network {
         topic: &str,
         message_type: &str,
     ) -> Result<Publisher<M>, BridgeError> {
+        self.publisher_with(topic, message_type, reliable())
+    }
+
+    /// Creates a publisher whose last message also reaches late subscribers, as maps are published.
+    pub(crate) fn kept_publisher<M: Serialize>(
+        &mut self,
+        topic: &str,
+        message_type: &str,
+    ) -> Result<Publisher<M>, BridgeError> {
+        self.publisher_with(topic, message_type, reliable().durability(Durability::TransientLocal))
+    }
+
+    /// Creates a publisher of messages that come in a row, of which none may be missed.
+    pub(crate) fn event_publisher<M: Serialize>(
+        &mut self,
+        topic: &str,
+        message_type: &str,
+    ) -> Result<Publisher<M>, BridgeError> {
+        let qos = reliable().history(History::KeepLast { depth: EVENTS });
+        self.publisher_with(topic, message_type, qos)
+    }
+
+    fn publisher_with<M: Serialize>(
+        &mut self,
+        topic: &str,
+        message_type: &str,
+        qos: QosProfile,
+    ) -> Result<Publisher<M>, BridgeError> {
         let node = &mut self.node;
-        let qos = reliable();
         let name = name(node.namespace(), topic)?;
         let handle = node.create_topic(&name, kind(message_type), &qos).map_err(failed)?;
         node.create_publisher(&handle, Some(qos)).map_err(failed)

@@ -6,7 +6,8 @@ use tagalong::log::{InputSettings, Limits};
 use tagalong::pipeline::RobotSettings;
 use tagalong::{LogSettings, Pipeline};
 
-use crate::{BridgeError, ClockSource, Middleware};
+use crate::forecast::ForecastSettings;
+use crate::{BridgeError, ClockSource, ForecastFrame, Middleware};
 
 /// Follows people live: ROS 2 images and odometry in, tracks and commands out.
 ///
@@ -78,6 +79,22 @@ pub struct Options {
     /// Topic of people for planners with a social cost map (people_msgs/People); empty for none.
     #[arg(long, value_name = "TOPIC", default_value = "people")]
     pub people: String,
+    /// Topic of a grid of where people will be, for social layers of costmaps
+    /// (nav_msgs/OccupancyGrid); empty for none.
+    #[arg(long, value_name = "TOPIC", default_value = "people/forecast")]
+    pub forecast: String,
+    /// Frame of that grid.
+    #[arg(long, value_enum, default_value_t)]
+    pub forecast_frame: ForecastFrame,
+    /// Side of a cell of that grid, m.
+    #[arg(long, value_name = "METRES", default_value_t = 0.1, value_parser = cell)]
+    pub forecast_resolution: f64,
+    /// Side of that grid, with the robot in its middle, m.
+    #[arg(long, value_name = "METRES", default_value_t = 12.0, value_parser = side)]
+    pub forecast_size: f64,
+    /// Time for which people are forecast in that grid, s.
+    #[arg(long, value_name = "SECONDS", default_value_t = 3.0, value_parser = horizon)]
+    pub forecast_horizon: f64,
     /// Topic of commands.
     #[arg(long, value_name = "TOPIC", default_value = "cmd_vel")]
     pub command: String,
@@ -115,6 +132,20 @@ pub struct Options {
     /// Clock for the age of a frame.
     #[arg(long, value_enum, default_value_t)]
     pub clock: ClockSource,
+    /// Action of Nav2's following server (nav2_msgs/FollowObject), which drives in place of this
+    /// program; it is given a goal while the switch allows it and a person is followed.
+    #[arg(
+        long,
+        value_name = "ACTION",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "follow_object"
+    )]
+    pub follow_object: Option<String>,
+    /// Start unconfigured, and wait for a manager to configure and activate the node (lifecycle_msgs).
+    /// Otherwise the node activates itself.
+    #[arg(long)]
+    pub lifecycle: bool,
 }
 
 /// Type of the command messages.
@@ -134,6 +165,18 @@ fn rate(text: &str) -> Result<f64, String> {
 
 fn seconds(text: &str) -> Result<f64, String> {
     within(text, 1.0, 3600.0)
+}
+
+fn cell(text: &str) -> Result<f64, String> {
+    within(text, 0.02, 1.0)
+}
+
+fn side(text: &str) -> Result<f64, String> {
+    within(text, 1.0, 40.0)
+}
+
+fn horizon(text: &str) -> Result<f64, String> {
+    within(text, 1.0, 4.0)
 }
 
 fn within(text: &str, least: f64, most: f64) -> Result<f64, String> {
@@ -162,8 +205,22 @@ impl Options {
         check_security(|name| std::env::var(name).ok())?;
         let pipeline = Pipeline::builder(registry).from_toml_file(&self.config)?;
         let LogSettings { input, limits, .. } = LogSettings::of(&pipeline)?;
+        if self.follow_object.is_some() && !pipeline.has_controller() {
+            let words = "--follow-object needs a config with a [controller], whose target Nav2 follows; \
+                         configs/README.md lists them";
+            return Err(BridgeError::Config(words.to_owned()));
+        }
         let robot = pipeline.config().robot.clone();
         Ok(Setup { pipeline, robot, input: self.named(input), limits })
+    }
+
+    pub(crate) fn forecast_settings(&self) -> ForecastSettings {
+        ForecastSettings {
+            frame: self.forecast_frame,
+            resolution_m: self.forecast_resolution,
+            size_m: self.forecast_size,
+            horizon_s: self.forecast_horizon,
+        }
     }
 
     /// Returns the settings with the topics of the command line.

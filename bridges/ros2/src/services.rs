@@ -28,7 +28,7 @@ pub enum Middleware {
 }
 
 impl Middleware {
-    fn mapping(self) -> ServiceMapping {
+    pub(crate) fn mapping(self) -> ServiceMapping {
         match self {
             Self::FastDds => ServiceMapping::Enhanced,
             Self::CycloneDds => ServiceMapping::Cyclone,
@@ -96,7 +96,7 @@ pub(crate) fn offer(
 }
 
 /// Answers the requests of a service in a thread of its own.
-fn serve<Q, A>(
+pub(crate) fn serve<Q, A>(
     name: &str,
     server: Server<Q, A>,
     answer: impl Fn(Q) -> A + Send + 'static,

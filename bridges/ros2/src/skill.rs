@@ -12,6 +12,8 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 use tagalong::pipeline::{Enrollment, FollowStatus, Permission};
 
+use crate::nav2::GoalReport;
+
 /// Longest wait for an answer of the pipeline.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Requests that wait; more are refused.
@@ -20,6 +22,9 @@ const WAITING: usize = 16;
 const SILENCE: Duration = Duration::from_secs(2);
 /// Time in one frame from which on the pipeline is stuck.
 pub(crate) const STUCK: Duration = Duration::from_millis(500);
+
+/// Refusal while the node is not active, and cause of its latch.
+pub(crate) const NOT_ACTIVE: &str = "the node is not active";
 
 /// Change that a caller asks for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,6 +81,10 @@ pub(crate) struct BridgeStatus {
     pub(crate) frames: u64,
     /// Time since the last frame, s; null before the first.
     pub(crate) frame_age_s: Option<f64>,
+    /// State of the managed node.
+    pub(crate) lifecycle: &'static str,
+    /// State of the goal of Nav2's following server; null if this program drives.
+    pub(crate) nav2: Option<GoalReport>,
 }
 
 /// Health of the bridge.
@@ -104,6 +113,8 @@ struct Shared {
     turn: Option<Instant>,
     /// True once the pipeline takes requests.
     is_open: bool,
+    lifecycle: &'static str,
+    nav2: Option<GoalReport>,
 }
 
 impl Desk {
@@ -116,6 +127,17 @@ impl Desk {
     /// Lets requests in.
     pub(crate) fn open(&self) {
         self.lock().is_open = true;
+    }
+
+    /// Refuses requests, until [`Desk::open`], in this state of the node.
+    pub(crate) fn close(&self, lifecycle: &'static str) {
+        // Nothing of an earlier time says how the bridge is now.
+        *self.lock() = Shared { lifecycle, ..Shared::default() };
+    }
+
+    /// Sets the state of the goal of the following server.
+    pub(crate) fn set_goal(&self, report: GoalReport) {
+        self.lock().nav2 = Some(report);
     }
 
     /// Sets the state after a frame.
@@ -133,11 +155,18 @@ impl Desk {
         }
     }
 
+    fn check_open(&self) -> Result<(), Refusal> {
+        let shared = self.lock();
+        match shared.lifecycle {
+            _ if shared.is_open => Ok(()),
+            "" | "active" => Err(Refusal::Busy("the topics of the robot are still waited for")),
+            _ => Err(Refusal::Busy(NOT_ACTIVE)),
+        }
+    }
+
     /// Hands a verb to the pipeline and waits for its answer.
     pub(crate) fn ask(&self, verb: Verb) -> Result<(), Refusal> {
-        if !self.lock().is_open {
-            return Err(Refusal::Busy("the topics of the robot are still waited for"));
-        }
+        self.check_open()?;
         let (answer, answered) = sync_channel(1);
         self.requests.try_send(Request { verb, answer }).map_err(|error| match error {
             TrySendError::Full(_) => Refusal::Busy("too many requests wait"),
@@ -157,6 +186,8 @@ impl Desk {
             permission: shared.permission.map(Permission::cause),
             frames: shared.frames,
             frame_age_s: shared.frame.map(|at| at.elapsed().as_secs_f64()),
+            lifecycle: shared.lifecycle,
+            nav2: shared.nav2.clone(),
         }
     }
 
@@ -165,7 +196,12 @@ impl Desk {
         let shared = self.lock();
         let fault = shared.follow.as_ref().and_then(|follow| follow.fault);
         let stuck = shared.turn.map(|at| at.elapsed()).filter(|since| *since > STUCK);
+        let is_unconfirmed = shared.nav2.as_ref().is_some_and(|goal| goal.is_unconfirmed);
         let reason = match (stuck, shared.frame, fault) {
+            _ if !["", "active"].contains(&shared.lifecycle) => {
+                Some(format!("the node is {}", shared.lifecycle))
+            }
+            _ if is_unconfirmed => Some("Nav2 does not confirm that it stops".to_owned()),
             (Some(since), ..) => Some(format!("one frame takes {:.1} s", since.as_secs_f64())),
             (_, None, _) => Some("no frame yet".to_owned()),
             (_, Some(at), _) if at.elapsed() > SILENCE => {
@@ -215,6 +251,29 @@ mod tests {
         assert!(stuck.reason().contains("stuck in a frame"), "{stuck:?}");
         drop(requests);
         assert_eq!(desk.ask(Verb::Clear), Err(Refusal::Busy("the bridge ends")));
+    }
+
+    #[test]
+    fn a_node_that_is_not_active_refuses_requests_and_is_not_well() {
+        let (desk, _requests) = Desk::new();
+        desk.open();
+        desk.frame(None, 1);
+        desk.turn(Some(Permission::NotEnabled), None);
+        desk.close("inactive");
+        assert_eq!(desk.ask(Verb::Clear).unwrap_err().reason(), NOT_ACTIVE);
+        assert_eq!(desk.health().reason.as_deref(), Some("the node is inactive"));
+        let status = desk.status();
+        assert_eq!((status.permission, status.frames, status.lifecycle), (None, 0, "inactive"));
+        desk.close("active");
+        let waits = desk.ask(Verb::Clear).unwrap_err();
+        assert_eq!(waits.reason(), "the topics of the robot are still waited for");
+        assert_eq!(desk.health().reason.as_deref(), Some("no frame yet"));
+        desk.open();
+        desk.frame(None, 2);
+        desk.turn(Some(Permission::NotEnabled), None);
+        assert!(desk.health().ok);
+        desk.set_goal(GoalReport { is_unconfirmed: true, ..GoalReport::default() });
+        assert_eq!(desk.health().reason.as_deref(), Some("Nav2 does not confirm that it stops"));
     }
 
     #[test]

@@ -57,6 +57,44 @@ impl SwitchHandle {
     pub fn permission(&self) -> Permission {
         self.shared.lock().switch.permission(self.now())
     }
+
+    /// Stops the robot and ends the commands: zeros go out if others did before, then none until
+    /// [`SwitchHandle::resume`]. The switch latches, so that a resume alone moves nothing.
+    pub fn halt(&self, cause: &'static str) {
+        let now = self.now();
+        let mut state = self.shared.lock();
+        state.switch.take(Enable::Fault(cause), now);
+        *state = State { orders: None, is_active: false, is_new: true, ..*state };
+        self.shared.changed.notify_all();
+    }
+
+    /// Lets commands go out again after [`SwitchHandle::halt`].
+    pub fn resume(&self) {
+        let mut state = self.shared.lock();
+        // The orders of a frame that was under way at the halt are old.
+        *state = State { orders: None, is_active: true, ..*state };
+    }
+
+    /// Sets the node that drives.
+    pub(crate) fn set_driver(&self, driver: Driver) {
+        let mut state = self.shared.lock();
+        if state.driver != driver {
+            *state = State { driver, is_new: true, ..*state };
+            self.shared.changed.notify_all();
+        }
+    }
+}
+
+/// Node that drives the robot.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Driver {
+    /// This one.
+    #[default]
+    Bridge,
+    /// Another one, as long as the switch gives permission: until then this one says nothing.
+    Other,
+    /// Another one that should have stopped and did not confirm it: zeros go on in any case.
+    Unconfirmed,
 }
 
 struct Shared {
@@ -76,6 +114,9 @@ struct State {
     frame: Option<Instant>,
     /// True if the orders have not been sent yet.
     is_new: bool,
+    /// False after a halt: no commands.
+    is_active: bool,
+    driver: Driver,
     quits: bool,
 }
 
@@ -83,6 +124,12 @@ impl State {
     /// Returns the command for this time, if any; `since` is the time by the clock of the switch.
     fn command(&self, now: Stamp, since: Duration) -> Option<WheelSpeeds> {
         let granted = self.switch.permission(since).is_granted();
+        match self.driver {
+            Driver::Unconfirmed => return Some(WheelSpeeds::STOP),
+            _ if !self.is_active => return None,
+            Driver::Other if granted => return None,
+            Driver::Bridge | Driver::Other => {}
+        }
         let orders = self.orders.filter(|_| granted);
         let wheels = orders.map_or(WheelSpeeds::STOP, |orders| orders.at(now).wheels);
         let is_recent = self.frame.is_some_and(|at| at.elapsed().as_secs_f64() <= ZEROS_S);
@@ -111,6 +158,8 @@ impl Wheels {
             permitted: None,
             frame: None,
             is_new: false,
+            is_active: true,
+            driver: Driver::default(),
             quits: false,
         };
         let state = Mutex::new(state);
@@ -153,6 +202,22 @@ impl Drop for Wheels {
     }
 }
 
+impl CommandCounts {
+    fn count(&mut self, wheels: WheelSpeeds) {
+        self.commands += 1;
+        self.zeros += u64::from(wheels == WheelSpeeds::STOP);
+    }
+}
+
+/// Sends the zeros of an end, several for the case that some are lost.
+fn say_farewell(told: &mut CommandCounts, tell: &mut impl FnMut(WheelSpeeds)) {
+    for _ in 0..FAREWELLS {
+        told.count(WheelSpeeds::STOP);
+        tell(WheelSpeeds::STOP);
+        thread::sleep(BETWEEN_FAREWELLS);
+    }
+}
+
 impl Shared {
     fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
@@ -165,18 +230,21 @@ impl Shared {
         mut tell: impl FnMut(WheelSpeeds),
     ) -> CommandCounts {
         let mut told = CommandCounts::default();
-        let mut count_and_tell = |wheels| {
-            told.commands += 1;
-            told.zeros += u64::from(wheels == WheelSpeeds::STOP);
-            tell(wheels);
-        };
+        // True if the robot was driven since the last farewell.
+        let mut has_driven = false;
         while let Some(state) = self.wait(period) {
-            let since = self.started.elapsed();
-            state.command(now(), since).into_iter().for_each(&mut count_and_tell);
+            has_driven |= state.driver == Driver::Other;
+            if let Some(wheels) = state.command(now(), self.started.elapsed()) {
+                told.count(wheels);
+                tell(wheels);
+                has_driven = true;
+            } else if has_driven && !state.is_active {
+                say_farewell(&mut told, &mut tell);
+                has_driven = false;
+            }
         }
-        for _ in 0..FAREWELLS {
-            count_and_tell(WheelSpeeds::STOP);
-            thread::sleep(BETWEEN_FAREWELLS);
+        if has_driven || self.lock().is_active {
+            say_farewell(&mut told, &mut tell);
         }
         told
     }
@@ -205,9 +273,13 @@ mod tests {
     type Tape = Arc<Mutex<Vec<(Instant, WheelSpeeds)>>>;
 
     fn start(tape: &Tape) -> Wheels {
+        start_with(tape, Duration::from_millis(100))
+    }
+
+    fn start_with(tape: &Tape, timeout: Duration) -> Wheels {
         let tape = Arc::clone(tape);
         let tell = move |wheels| tape.lock().unwrap().push((Instant::now(), wheels));
-        let switch = EnableSwitch::new(Duration::from_millis(100));
+        let switch = EnableSwitch::new(timeout);
         Wheels::start(Duration::from_millis(5), switch, Stamp::default, tell).unwrap()
     }
 
@@ -257,6 +329,89 @@ mod tests {
         let last = tape.lock().unwrap().last().map(|(at, _)| at.duration_since(from)).unwrap();
         assert!(tape.lock().unwrap().len() > 20);
         assert!((1.5..ZEROS_S + 0.3).contains(&last.as_secs_f64()), "{last:?}");
+        drop(wheels);
+    }
+
+    fn told_since(tape: &Tape, then: Instant) -> Vec<WheelSpeeds> {
+        let told = tape.lock().unwrap();
+        told.iter().filter(|(at, _)| *at >= then).map(|(_, wheels)| *wheels).collect()
+    }
+
+    #[test]
+    fn a_halt_is_a_stop_and_then_silence_until_a_resume_a_reset_and_a_press() {
+        let tape = Tape::default();
+        let wheels = start(&tape);
+        let switch = wheels.switch();
+        enable(&wheels);
+        wheels.obey(None);
+        thread::sleep(Duration::from_millis(30));
+        let halted = Instant::now();
+        switch.halt("deactivated");
+        thread::sleep(Duration::from_millis(150));
+        let stops = told_since(&tape, halted);
+        assert!((5..8).contains(&stops.len()), "{stops:?}");
+        assert!(stops.iter().all(|wheels| *wheels == WheelSpeeds::STOP));
+        assert_eq!(switch.permission(), Permission::Latched("deactivated"));
+        let silent = Instant::now();
+        enable(&wheels);
+        wheels.obey(None);
+        thread::sleep(Duration::from_millis(50));
+        assert!(told_since(&tape, silent).is_empty(), "halted");
+        switch.halt("deactivated");
+        switch.resume();
+        switch.take(Enable::On, switch.now());
+        assert!(!switch.permission().is_granted(), "an enable alone is no reset");
+        thread::sleep(Duration::from_millis(150));
+        enable(&wheels);
+        wheels.obey(None);
+        thread::sleep(Duration::from_millis(30));
+        assert!(!told_since(&tape, silent).is_empty(), "resumed");
+        drop(wheels);
+    }
+
+    #[test]
+    fn a_halt_before_any_command_and_the_end_after_it_say_nothing() {
+        let tape = Tape::default();
+        let wheels = start(&tape);
+        wheels.switch().halt("deactivated");
+        thread::sleep(Duration::from_millis(50));
+        assert_eq!(wheels.finish(), CommandCounts::default());
+        assert!(tape.lock().unwrap().is_empty());
+    }
+
+    #[test]
+    fn beside_another_driver_zeros_go_out_only_without_permission_or_confirmation() {
+        let tape = Tape::default();
+        let timeout = Duration::from_millis(400);
+        let wheels = start_with(&tape, timeout);
+        let switch = wheels.switch();
+        switch.set_driver(Driver::Other);
+        enable(&wheels);
+        wheels.obey(None);
+        thread::sleep(Duration::from_millis(40));
+        assert!(tape.lock().unwrap().is_empty(), "the other one drives");
+        let halted = Instant::now();
+        switch.halt("deactivated");
+        thread::sleep(Duration::from_millis(100));
+        assert!(told_since(&tape, halted).len() >= FAREWELLS as usize, "a stop after its drive");
+        let silent = Instant::now();
+        thread::sleep(Duration::from_millis(50));
+        assert!(told_since(&tape, silent).is_empty(), "and then nothing");
+        switch.resume();
+        thread::sleep(timeout);
+        enable(&wheels);
+        wheels.obey(None);
+        let released = Instant::now();
+        switch.take(Enable::Off, switch.now());
+        thread::sleep(Duration::from_millis(40));
+        assert!(told_since(&tape, released).len() > 3, "a stop");
+        thread::sleep(Duration::from_secs_f64(ZEROS_S + 0.2));
+        let left = Instant::now();
+        thread::sleep(Duration::from_millis(40));
+        assert!(told_since(&tape, left).is_empty(), "the other one has stopped");
+        switch.set_driver(Driver::Unconfirmed);
+        thread::sleep(Duration::from_millis(40));
+        assert!(told_since(&tape, left).len() > 3, "the other one does not confirm its stop");
         drop(wheels);
     }
 

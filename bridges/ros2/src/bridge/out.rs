@@ -1,13 +1,14 @@
 //! Results that go out, for programs and for viewers.
 
 use ros2_client::Publisher;
-use tagalong::core::Stamp;
+use tagalong::core::{Frame, Stamp};
 use tagalong::log::msgs::{
     Detection3DArray, Header, MarkerArray, People, PoseStamped, StringMsg, TFMessage,
 };
 use tagalong::log::write::{self, FrameRecord, Trails};
 use tagalong::pipeline::FrameReport;
 
+use crate::forecast::{Forecast, Now, OccupancyGrid};
 use crate::network::Network;
 use crate::{BridgeError, Options};
 
@@ -18,6 +19,7 @@ pub(super) struct Out {
     state: Publisher<StringMsg>,
     heartbeat: Publisher<Header>,
     people: Option<Publisher<People>>,
+    forecast: Option<(Publisher<OccupancyGrid>, Forecast)>,
     transforms: Option<Publisher<TFMessage>>,
     markers: Option<Publisher<MarkerArray>>,
     trails: Trails,
@@ -35,6 +37,12 @@ impl Out {
             state: network.publisher(&options.state)?,
             heartbeat: network.publisher_of(&options.heartbeat, "std_msgs/msg/Header")?,
             people: named(&options.people).map(|topic| network.publisher(&topic)).transpose()?,
+            forecast: named(&options.forecast)
+                .map(|topic| {
+                    let grid = network.kept_publisher(&topic, "nav_msgs/msg/OccupancyGrid")?;
+                    Ok::<_, BridgeError>((grid, Forecast::new(options.forecast_settings())))
+                })
+                .transpose()?,
             transforms: named(&options.transforms)
                 .map(|topic| network.publisher(&topic))
                 .transpose()?,
@@ -48,6 +56,7 @@ impl Out {
     /// odometry if there is one.
     pub(super) fn publish(
         &mut self,
+        frame: &Frame,
         record: &FrameRecord<'_>,
         report: &FrameReport,
         base_frame: &str,
@@ -67,6 +76,13 @@ impl Out {
         }
         if let Some(people) = &self.people {
             let _lost = people.publish(write::people(record, world));
+        }
+        if let Some((publisher, forecast)) = &mut self.forecast {
+            let odom_from_robot = record.odom_from_robot;
+            let now = Now { frame, tracks: record.tracks, odom_from_robot, base_frame, world };
+            if let Some(grid) = forecast.grid(now) {
+                let _lost = publisher.publish(grid);
+            }
         }
         self.draw(record, world);
     }
@@ -98,3 +114,6 @@ impl Out {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -108,7 +108,7 @@ pub(super) fn twist(WheelSpeeds { left, right }: WheelSpeeds, half_m: f64) -> Tw
 }
 
 /// Returns the data that a controller may need and that has arrived.
-pub(super) fn sources(source: &LiveSource) -> Sources {
+pub(crate) fn sources(source: &LiveSource) -> Sources {
     let facts = source.facts();
     Sources {
         depth: facts.depth_topic.is_some(),

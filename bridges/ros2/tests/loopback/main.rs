@@ -5,7 +5,10 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a failing test may panic")]
 
 mod faults;
+mod forecast;
 mod lidar;
+mod lifecycle;
+mod nav2;
 mod peers;
 mod skill;
 mod video;
@@ -40,6 +43,7 @@ fn images_become_tracks_and_commands_and_silence_becomes_zero() {
     let drawn = robot.peer.collect::<MarkerArray>("/people/markers", &heard_all);
     let frames = robot.peer.collect::<TFMessage>("/tf", &heard_all);
     let people = robot.peer.collect::<People>("/people", &heard_all);
+    let grids = forecast::collect(&mut robot.peer, &heard_all);
     let commands = robot.peer.collect::<TwistStamped>("/cmd_vel", &heard_all);
     let (bridge, said) = bridge(domain(0), &stop);
     let hand = Hand::new(domain(0), &stop);
@@ -57,7 +61,9 @@ fn images_become_tracks_and_commands_and_silence_becomes_zero() {
     let tracks = tracks.finish();
     let poses = poses.finish();
     let states = states.finish();
-    check_viewers(&drawn.finish(), &frames.finish(), &people.finish());
+    let people = people.finish();
+    forecast::check(&grids.finish(), &people);
+    check_viewers(&drawn.finish(), &frames.finish(), &people);
     let commands = commands.finish();
     eprintln!("{summary}");
 
@@ -256,7 +262,7 @@ fn odometry_that_stops_while_frames_go_on_stops_the_robot_and_another_calibratio
 }
 
 /// Controller that drives ahead, and is stuck for a while once the flag is set.
-struct Stuck(Arc<AtomicBool>);
+pub(crate) struct Stuck(pub(crate) Arc<AtomicBool>);
 
 /// Time for which it is stuck.
 const STUCK: Duration = Duration::from_millis(3000);

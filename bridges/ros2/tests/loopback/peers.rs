@@ -35,14 +35,23 @@ pub(crate) fn scene(seconds: f64) -> Scene {
     Scene::parse_with(include_str!("../../../../tests/scenes/small-room.toml"), &walk).unwrap()
 }
 
+/// Returns a scene of so many seconds, of a person that stands before the robot.
+pub(crate) fn standing(seconds: f64) -> Scene {
+    let stands = Variant::default()
+        .with("duration_s", seconds)
+        .with("people.0.path", "[[3.0, 2.0], [7.0, 2.0]]")
+        .with("people.0.start_s", seconds);
+    Scene::parse_with(include_str!("../../../../tests/scenes/small-room.toml"), &stands).unwrap()
+}
+
 /// Longest time between the last image and a command that moves: the validity of a command, a
 /// control period, and the transmission.
 pub(crate) const LAST_MOVE_S: f64 = 0.5 + 0.04 + 0.2;
 
 /// Returns a domain that no other run of this test is likely to use.
 pub(crate) fn domain(offset: u32) -> u16 {
-    // Fourteen domains per process, below the limit of 232.
-    (100 + 14 * (std::process::id() % 9) + offset) as u16
+    // Seventeen domains per process, below the limit of 232.
+    (100 + 17 * (std::process::id() % 7) + offset) as u16
 }
 
 /// Returns a guard for a test that runs alone, or `None` where participants do not hear each other.

@@ -18,8 +18,8 @@ use tagalong_sim::Simulation;
 use crate::peers::*;
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
-struct TriggerRequest {
-    byte: u8,
+pub(crate) struct TriggerRequest {
+    pub(crate) byte: u8,
 }
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -39,7 +39,12 @@ struct SpeedLimit {
     speed_limit: f64,
 }
 
-fn client<Q, A>(peer: &mut Peer, service: &str, package: &str, kind: &str) -> Client<Q, A>
+pub(crate) fn client<Q, A>(
+    peer: &mut Peer,
+    service: &str,
+    package: &str,
+    kind: &str,
+) -> Client<Q, A>
 where
     Q: Message + Clone + 'static,
     A: Message + Clone + 'static,
@@ -50,23 +55,35 @@ where
 }
 
 /// Calls a service, again until it answers: the first request may come before the two know each other.
-fn call<Q, A>(client: &Client<Q, A>, request: &Q) -> A
+pub(crate) fn call<Q, A>(client: &Client<Q, A>, request: &Q) -> A
 where
     Q: Message + Clone + 'static,
     A: Message + Clone + 'static,
 {
     let from = Instant::now();
     while from.elapsed() < Duration::from_secs(15) {
-        let id = client.send_request(request.clone()).unwrap();
-        let sent = Instant::now();
-        while sent.elapsed() < Duration::from_secs(3) {
-            match client.receive_response() {
-                Ok(Some((answered, answer))) if answered == id => return answer,
-                _ => sleep(Duration::from_millis(10)),
-            }
+        if let Some(answer) = call_once(client, request, Duration::from_secs(3)) {
+            return answer;
         }
     }
     panic!("the service does not answer");
+}
+
+/// Calls a service that knows this caller; returns its answer if one comes in time.
+pub(crate) fn call_once<Q, A>(client: &Client<Q, A>, request: &Q, patience: Duration) -> Option<A>
+where
+    Q: Message + Clone + 'static,
+    A: Message + Clone + 'static,
+{
+    let id = client.send_request(request.clone()).unwrap();
+    let sent = Instant::now();
+    while sent.elapsed() < patience {
+        match client.receive_response() {
+            Ok(Some((answered, answer))) if answered == id => return Some(answer),
+            _ => sleep(Duration::from_millis(10)),
+        }
+    }
+    None
 }
 
 /// Returns status code and body of a request with JSON.
