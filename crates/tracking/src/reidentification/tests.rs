@@ -145,6 +145,21 @@ fn after_a_contact(left: [u8; 3], right: [u8; 3]) -> Vec<u32> {
 }
 
 #[test]
+fn several_appearances_differ_by_their_mean() {
+    let mut scene = Scene::new();
+    let apart = [track(1, 0.8, 1.6), track(2, -0.8, 1.6)];
+    scene.show(30, &frame(RED, BLUE), &apart);
+    let Scene { stage } = &scene;
+    let person = &stage.tracks[&TrackId(1)].person;
+    let looks = [RED, VIOLET]
+        .map(|colour| stage.describer.of(&apart[0].estimate, &frame(colour, colour)).unwrap());
+    let [same, other] = [0, 1].map(|k| person.difference(&looks[k..=k]).unwrap());
+    let both = person.difference(&looks).unwrap();
+    assert!(other > 0.3 && (both - 0.5 * (same + other)).abs() < 1e-12, "{same} {other} {both}");
+    assert_eq!(person.difference(&[]), None);
+}
+
+#[test]
 fn without_memory_each_track_has_its_number() {
     let mut scene = Scene {
         stage: Reidentifier::new(ReidentificationSettings::default(), Describer::default()),
@@ -239,6 +254,8 @@ fn the_nearer_person_covers_the_farther_one() {
     assert!(covers(&near, &far) && !covers(&far, &near));
     let same = Track { id: TrackId(1), ..far.clone() };
     assert!(!covers(&near, &same), "nobody covers themselves");
+    let beside = Track { id: TrackId(3), ..near.clone() };
+    assert!(!covers(&near, &beside) && !covers(&beside, &near), "neither is nearer");
     far.estimate.region.x += 2.0 * far.estimate.region.width;
     assert!(!covers(&near, &far), "beside each other in the image");
 }
@@ -264,6 +281,22 @@ fn a_person_who_walked_away_is_not_back_at_once() {
     assert_eq!(number_of_next(1000.0, 10), 1);
     assert_eq!(number_of_next(1.5, 10), 2, "it would have to turn within a second");
     assert_eq!(number_of_next(1.5, 40), 1, "it has had the time");
+}
+
+/// What the track looks like shows only after a while.
+#[test]
+fn a_track_takes_over_a_number_soon_after_its_start_or_never() {
+    fn number_after(hidden_frames: usize) -> u32 {
+        let mut scene = Scene::new();
+        let image = frame(RED, BLUE);
+        scene.show(30, &image, &[track(1, 0.8, 1.6)]);
+        scene.show(20, &image, &[]);
+        let hidden = Track { occluded: true, ..track(2, 0.8, 1.6) };
+        scene.show(hidden_frames, &image, &[hidden]);
+        scene.show(10, &image, &[track(2, 0.8, 1.6)])[0]
+    }
+
+    assert_eq!([number_after(10), number_after(25)], [1, 2]);
 }
 
 #[test]
