@@ -200,6 +200,18 @@ fn a_frame_on_which_the_detector_does_not_run_is_no_miss() {
     assert_eq!(script.asked(), [(2, None), (6, None)]);
 }
 
+/// The other detector runs on each frame and finds nobody.
+#[test]
+fn the_silence_of_a_detector_is_no_miss_of_the_tracks_of_another() {
+    let script = Script::of([person(3.0, 0.0)]);
+    let mut slot = script.slot(&[Role::Discover]);
+    slot.settings.every = 4;
+    let detectors = vec![Script::default().slot(&[Role::Discover]), slot];
+    let mut tracker = Tracker::new(Parts { detectors, ..parts() }, TrackerSettings::default());
+    assert_eq!(ids(&run(&mut tracker, 1..=4).tracks), [1]);
+    assert!(run(&mut tracker, 5..=5).tracks[0].confirmed);
+}
+
 #[test]
 fn a_person_behind_another_is_not_searched_for_and_not_missed() {
     let script = Script::of([person(2.0, 0.0), person(4.0, 1.0)]);

@@ -60,6 +60,15 @@ impl Scene {
         }
         numbers
     }
+
+    /// Returns the numbers of a track in red and one in blue after a contact from which they come
+    /// in these colours.
+    fn after_a_contact(&mut self, left: [u8; 3], right: [u8; 3]) -> Vec<u32> {
+        let apart = [track(1, 0.8, 1.6), track(2, -0.8, 1.6)];
+        assert_eq!(self.show(30, &frame(RED, BLUE), &apart), [1, 2]);
+        self.show(5, &frame(RED, BLUE), &[track(1, 0.1, 1.6), track(2, -0.1, 1.6)]);
+        self.show(10, &frame(left, right), &apart)
+    }
 }
 
 #[test]
@@ -134,14 +143,28 @@ fn a_track_changes_over_against_lesser_doubts_of_the_other() {
     assert_eq!(after_a_contact(BLUE, VIOLET), [2, 1]);
 }
 
+#[test]
+fn a_track_changes_over_only_by_more_than_the_margin() {
+    let mut scene = Scene::new();
+    scene.stage.settings.margin = 1.0;
+    assert_eq!(scene.after_a_contact(BLUE, RED), [1, 2]);
+}
+
+#[test]
+fn tracks_that_come_nearer_than_the_setting_are_rivals() {
+    let mut scene = Scene::new();
+    let alone_m = scene.stage.settings.alone_m;
+    for (apart_m, are_rivals) in [(alone_m, false), (0.98 * alone_m, true)] {
+        let pair = [track(1, 0.5 * apart_m, 1.6), track(2, -0.5 * apart_m, 1.6)];
+        scene.show(1, &frame(RED, BLUE), &pair);
+        assert_eq!(!scene.stage.tracks[&TrackId(1)].rivals.is_empty(), are_rivals, "{apart_m} m");
+    }
+}
+
 /// Returns the numbers of a track in red and one in blue after a contact from which they come in
 /// these colours.
 fn after_a_contact(left: [u8; 3], right: [u8; 3]) -> Vec<u32> {
-    let mut scene = Scene::new();
-    let apart = [track(1, 0.8, 1.6), track(2, -0.8, 1.6)];
-    assert_eq!(scene.show(30, &frame(RED, BLUE), &apart), [1, 2]);
-    scene.show(5, &frame(RED, BLUE), &[track(1, 0.1, 1.6), track(2, -0.1, 1.6)]);
-    scene.show(10, &frame(left, right), &apart)
+    Scene::new().after_a_contact(left, right)
 }
 
 #[test]
