@@ -134,6 +134,16 @@ mod tests {
     }
 
     #[test]
+    fn one_density_alone_counts_where_it_is_set() {
+        let at_border = BirthSettings { inside_per_m2: 0.0, ..SETTINGS };
+        assert!(!is_kept(5.0, track(0.0, 1.0), 0.0, &at_border));
+        assert!(is_kept(270.0, track(9.0, 1.0), -9.0, &at_border), "nobody enters inside");
+        let inside = BirthSettings { border_per_m2: 0.0, ..SETTINGS };
+        assert!(!is_kept(270.0, track(1.6, 1.0), 0.0, &inside));
+        assert!(is_kept(5.0, track(9.0, 1.0), -9.0, &inside), "nor at the border");
+    }
+
+    #[test]
     fn people_enter_at_the_lower_border_and_not_at_the_upper_one() {
         fn of(y: f64) -> f64 {
             births_per_m2(&detection(270.0, y), &camera(), &SETTINGS)

@@ -81,6 +81,18 @@ mod tests {
     }
 
     #[test]
+    fn two_people_may_have_two_tracks_each() {
+        let mut finder = DuplicateFinder::default();
+        let pairs = [(TrackId(1), TrackId(2)), (TrackId(3), TrackId(4))];
+        let frames: Vec<_> = (0..3).map(|_| find(&mut finder, &[0.0, 0.1, 1.0, 1.1])).collect();
+        assert_eq!(frames, [vec![], vec![], pairs.to_vec()]);
+        let mut finder = DuplicateFinder::default();
+        let frames: Vec<_> = (0..3).map(|_| find(&mut finder, &[0.0, 0.1, 0.05])).collect();
+        let both = vec![PAIR[0], (TrackId(1), TrackId(3))];
+        assert_eq!(frames[2], both, "one that ended is in no further pair");
+    }
+
+    #[test]
     fn a_hidden_track_is_no_duplicate_of_the_one_in_front() {
         let mut finder = DuplicateFinder::default();
         for _ in 0..10 {

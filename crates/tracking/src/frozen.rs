@@ -37,3 +37,44 @@ fn axes(motion: &EgoMotion) -> SMatrix<f64, 5, 5> {
     axes.fixed_view_mut::<2, 2>(3, 3).copy_from(&turn);
     axes
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::FRAC_PI_2;
+
+    use nalgebra::{Point2, Point3, Vector2, one};
+    use tagalong_core::TrackId;
+    use tagalong_geometry::Rect;
+
+    use super::*;
+
+    /// The robot drives a metre ahead and turns to the left: what was ahead is to the right.
+    #[test]
+    fn a_held_track_stays_at_its_place_on_the_floor() {
+        let person =
+            Person { position: Point3::new(3.0, 0.5, 1.6), velocity: Vector2::new(1.0, 0.2) };
+        let covariance = SMatrix::from_diagonal(&[0.4, 0.1, 0.2, 0.6, 0.3].into());
+        let track = Track {
+            id: TrackId(7),
+            estimate: Estimate { person, covariance, region: Rect::default() },
+            seen: true,
+            occluded: true,
+            confirmed: true,
+            age: 3,
+            unseen_s: 0.5,
+            score: 2.0,
+        };
+        let turn = FRAC_PI_2;
+        let motion = EgoMotion { forward: 1.0, turn, ..EgoMotion::at_rest(0.25) };
+        let held = held(&track, &motion, &Camera::blind(one()));
+        let Estimate { person, covariance, .. } = &held.estimate;
+        assert!((person.position.xy() - Point2::new(0.5, -2.0)).norm() < 1e-12, "{person:?}");
+        assert_eq!(person.position.z, 1.6);
+        assert!((person.velocity - Vector2::new(0.2, -1.0)).norm() < 1e-12, "{person:?}");
+        for (found, expected) in covariance.diagonal().iter().zip([0.1, 0.4, 0.2, 0.3, 0.6]) {
+            assert!((found - expected).abs() < 1e-12, "{covariance}");
+        }
+        assert_eq!((held.id, held.confirmed, held.score), (TrackId(7), true, 2.0));
+        assert_eq!((held.seen, held.occluded, held.age, held.unseen_s), (false, false, 4, 0.75));
+    }
+}

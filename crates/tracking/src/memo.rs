@@ -80,3 +80,58 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     // Entries are inserted whole, so a map that another pipeline's panic poisoned is still valid.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use nalgebra::{Matrix3, Point3, one};
+    use tagalong_core::{EgoMotion, Images, Stamp};
+    use tagalong_geometry::Camera;
+
+    use super::*;
+
+    fn frame() -> Frame {
+        let camera = Arc::new(Camera::blind(one()));
+        Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), Images::default())
+    }
+
+    fn person(score: f64) -> Detection {
+        Detection::new("test", Point3::new(3.0, 0.0, 1.6), Matrix3::identity(), score)
+    }
+
+    /// Returns the scores that a pipeline gets for the same query, where a detector would find
+    /// `score` now; it drops one candidate in each search.
+    fn ask(frame: &Frame, identity: &str, occupied: &[Detection], score: f64) -> (Vec<f64>, u64) {
+        let mut funnel = Funnel::default();
+        let query = Query::Discover { occupied };
+        let answer = found(identity, frame, &query, &mut funnel, |funnel| {
+            funnel.drop_many("too small", 1);
+            Ok(vec![person(score)])
+        });
+        let scores = answer.unwrap().iter().map(|detection| detection.score).collect();
+        (scores, funnel.count("too small"))
+    }
+
+    #[test]
+    fn the_same_detector_is_asked_the_same_once_a_frame() {
+        let first = frame();
+        assert_eq!(ask(&first, "one", &[], 1.0), (vec![1.0], 1));
+        assert_eq!(ask(&first, "one", &[], 2.0), (vec![1.0], 1), "the same, with what was dropped");
+        assert_eq!(ask(&first, "one", &[person(5.0)], 3.0), (vec![3.0], 1), "another query");
+        assert_eq!(ask(&first, "other", &[], 4.0), (vec![4.0], 1), "another detector");
+        assert_eq!(ask(&frame(), "one", &[], 6.0), (vec![6.0], 1), "another frame");
+    }
+
+    #[test]
+    fn the_same_verifier_judges_the_same_candidate_once_a_frame() {
+        let frame = frame();
+        let judge = |identity: &str, candidate: f64, would_say: f64| {
+            log_odds(identity, &frame, &person(candidate), || Ok(would_say)).unwrap()
+        };
+        assert_eq!(judge("one", 1.0, -0.25), -0.25);
+        assert_eq!(judge("one", 1.0, 0.5), -0.25);
+        assert_eq!(judge("one", 2.0, 0.75), 0.75);
+        assert_eq!(judge("other", 1.0, 1.25), 1.25);
+    }
+}

@@ -428,6 +428,19 @@ mod tests {
     }
 
     #[test]
+    fn a_region_without_a_size_shows_nobody() {
+        let camera = camera();
+        let settings = OcclusionSettings::default();
+        let head = Point3::new(3.0, 0.0, 1.6);
+        let seen = |width: f64, height: f64| {
+            let region = Rect::new(300.0, 100.0, width, height);
+            visibility(&region, &head, &[], &camera, &settings)
+        };
+        assert_eq!(seen(50.0, 50.0), Visibility::Visible);
+        assert_eq!([seen(0.0, 50.0), seen(50.0, 0.0)], [Visibility::Outside; 2]);
+    }
+
+    #[test]
     fn ranges_are_those_from_the_camera() {
         assert!((range_m(&Point3::new(3.0, 0.0, 5.2), &camera()) - 5.0).abs() < 1e-12);
     }

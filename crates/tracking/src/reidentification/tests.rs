@@ -52,6 +52,15 @@ impl Scene {
         }
         numbers
     }
+
+    /// Returns the numbers of a track in red and one in blue after a contact from which they come
+    /// in these colours.
+    fn after_a_contact(&mut self, left: [u8; 3], right: [u8; 3]) -> Vec<u32> {
+        let apart = [track(1, 0.8, 1.6), track(2, -0.8, 1.6)];
+        assert_eq!(self.show(30, &frame(RED, BLUE), &apart), [1, 2]);
+        self.show(5, &frame(RED, BLUE), &[track(1, 0.1, 1.6), track(2, -0.1, 1.6)]);
+        self.show(10, &frame(left, right), &apart)
+    }
 }
 
 #[test]
@@ -126,14 +135,43 @@ fn a_track_changes_over_against_lesser_doubts_of_the_other() {
     assert_eq!(after_a_contact(BLUE, VIOLET), [2, 1]);
 }
 
+#[test]
+fn a_track_changes_over_only_by_more_than_the_margin() {
+    let mut scene = Scene::new();
+    scene.stage.settings.margin = 1.0;
+    assert_eq!(scene.after_a_contact(BLUE, RED), [1, 2]);
+}
+
+#[test]
+fn tracks_that_come_nearer_than_the_setting_are_rivals() {
+    let mut scene = Scene::new();
+    let alone_m = scene.stage.settings.alone_m;
+    for (apart_m, are_rivals) in [(alone_m, false), (0.98 * alone_m, true)] {
+        let pair = [track(1, 0.5 * apart_m, 1.6), track(2, -0.5 * apart_m, 1.6)];
+        scene.show(1, &frame(RED, BLUE), &pair);
+        assert_eq!(!scene.stage.tracks[&TrackId(1)].rivals.is_empty(), are_rivals, "{apart_m} m");
+    }
+}
+
 /// Returns the numbers of a track in red and one in blue after a contact from which they come in
 /// these colours.
 fn after_a_contact(left: [u8; 3], right: [u8; 3]) -> Vec<u32> {
+    Scene::new().after_a_contact(left, right)
+}
+
+#[test]
+fn several_appearances_differ_by_their_mean() {
     let mut scene = Scene::new();
     let apart = [track(1, 0.8, 1.6), track(2, -0.8, 1.6)];
-    assert_eq!(scene.show(30, &frame(RED, BLUE), &apart), [1, 2]);
-    scene.show(5, &frame(RED, BLUE), &[track(1, 0.1, 1.6), track(2, -0.1, 1.6)]);
-    scene.show(10, &frame(left, right), &apart)
+    scene.show(30, &frame(RED, BLUE), &apart);
+    let Scene { stage } = &scene;
+    let person = &stage.tracks[&TrackId(1)].person;
+    let looks = [RED, VIOLET]
+        .map(|colour| stage.describer.of(&apart[0].estimate, &frame(colour, colour)).unwrap());
+    let [same, other] = [0, 1].map(|k| person.difference(&looks[k..=k]).unwrap());
+    let both = person.difference(&looks).unwrap();
+    assert!(other > 0.3 && (both - 0.5 * (same + other)).abs() < 1e-12, "{same} {other} {both}");
+    assert_eq!(person.difference(&[]), None);
 }
 
 #[test]
@@ -231,6 +269,8 @@ fn the_nearer_person_covers_the_farther_one() {
     assert!(covers(&near, &far) && !covers(&far, &near));
     let same = far.clone().with_id(TrackId(1));
     assert!(!covers(&near, &same), "nobody covers themselves");
+    let beside = Track { id: TrackId(3), ..near.clone() };
+    assert!(!covers(&near, &beside) && !covers(&beside, &near), "neither is nearer");
     far.estimate.region.x += 2.0 * far.estimate.region.width;
     assert!(!covers(&near, &far), "beside each other in the image");
 }
@@ -254,6 +294,22 @@ fn a_person_who_walked_away_is_not_back_at_once() {
     assert_eq!(number_of_next(1000.0, 10), 1);
     assert_eq!(number_of_next(1.5, 10), 2, "it would have to turn within a second");
     assert_eq!(number_of_next(1.5, 40), 1, "it has had the time");
+}
+
+/// What the track looks like shows only after a while.
+#[test]
+fn a_track_takes_over_a_number_soon_after_its_start_or_never() {
+    fn number_after(hidden_frames: usize) -> u32 {
+        let mut scene = Scene::new();
+        let image = frame(RED, BLUE);
+        scene.show(30, &image, &[track(1, 0.8, 1.6)]);
+        scene.show(20, &image, &[]);
+        let hidden = Track { occluded: true, ..track(2, 0.8, 1.6) };
+        scene.show(hidden_frames, &image, &[hidden]);
+        scene.show(10, &image, &[track(2, 0.8, 1.6)])[0]
+    }
+
+    assert_eq!([number_after(10), number_after(25)], [1, 2]);
 }
 
 #[test]

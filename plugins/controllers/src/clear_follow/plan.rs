@@ -239,6 +239,18 @@ mod tests {
         near(price(STILL, &[], &[stands(1.5, 0.0)]), 0.8 / 0.9 + 0.05);
     }
 
+    /// A post that is passed as easily on either side.
+    #[test]
+    fn a_post_is_passed_on_the_side_to_which_the_robot_turns() {
+        for side in [1.0, -1.0] {
+            let nominal = Twist::new(0.8, 0.1 * side);
+            let post = [Point2::new(1.5, 0.08 * side)];
+            let planned = plan(&Config::default(), nominal, &around(&post, &[]));
+            assert!((planned.angular_rps - 0.5 * side).abs() < 1e-9, "{planned:?}");
+            assert_eq!(planned.linear_mps, 0.8);
+        }
+    }
+
     #[test]
     fn it_turns_on_rather_than_back_and_no_faster_than_it_may() {
         let config = Config::default();
