@@ -100,12 +100,16 @@ const showImage = () => {
   for (const step of [1, 2]) if (at + step < about.frames.length) new Image().src = `frame/${about.frames[at + step]}.jpg`;
 };
 
-const scale = () => about.size[0] / byId("boxes").getBoundingClientRect().width;
+// Before the page has its layout, the image has no width.
+const scale = () => {
+  const { width } = byId("boxes").getBoundingClientRect();
+  return width > 0 ? about.size[0] / width : 1;
+};
 
 const showBoxes = () => {
   const stage = byId("boxes");
   stage.replaceChildren();
-  const unit = scale() || 1;
+  const unit = scale();
   const ids = here().filter((id) => id !== chosen);
   if (chosen !== null && rowOf(chosen)) ids.push(chosen);
   for (const id of ids) drawBox(stage, id, drag?.id === id && drag.box ? drag.box : rowOf(id).box, unit);
@@ -399,6 +403,8 @@ const listen = () => {
   boxes.addEventListener("pointercancel", () => { drag = null; showBoxes(); });
   document.addEventListener("keydown", onKey);
   window.addEventListener("resize", show);
+  // Lines and letters keep their size on the screen, whenever the image gets its own.
+  new ResizeObserver(showBoxes).observe(byId("boxes"));
 };
 
 const begin = async () => {
