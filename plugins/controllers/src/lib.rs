@@ -20,8 +20,10 @@
 //! ```
 
 pub mod arc_follow;
+mod around;
 pub mod clear_follow;
 mod forecast;
+pub mod foresee_follow;
 mod history;
 mod steps;
 
@@ -34,6 +36,7 @@ use tagalong_config::Registry;
 pub fn register(registry: &mut Registry) {
     arc_follow::register(registry);
     clear_follow::register(registry);
+    foresee_follow::register(registry);
 }
 
 #[cfg(test)]
