@@ -1,6 +1,6 @@
 //! The controllers, each in a module of its name, and their shared parts: the commands that the
-//! wheels have not executed yet, the time step of a frame, and the caution towards a target that was
-//! not seen lately.
+//! wheels have not executed yet, the time step of a frame, the caution towards a target that was
+//! not seen lately, and the forecast of people.
 //!
 //! ```
 //! use nalgebra::Vector2;
@@ -20,10 +20,14 @@
 //! ```
 
 pub mod arc_follow;
+mod around;
 pub mod clear_follow;
+mod forecast;
+pub mod foresee_follow;
 mod history;
 mod steps;
 
+pub use forecast::{Forecast, ForecastSettings};
 pub use history::CommandHistory;
 pub use steps::{coasting_weight, step_s};
 use tagalong_config::Registry;
@@ -32,6 +36,7 @@ use tagalong_config::Registry;
 pub fn register(registry: &mut Registry) {
     arc_follow::register(registry);
     clear_follow::register(registry);
+    foresee_follow::register(registry);
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
+use crate::around::{Look, NearestObstacles};
 use crate::{CommandHistory, coasting_weight, step_s};
 use nalgebra::{Point2, Vector2};
 use tagalong_core::{Controller, EgoMotion, Input, Inputs, Scene, Track, Twist, WheelSpeeds};
 
-use crate::clear_follow::around::NearestObstacles;
 use crate::clear_follow::config::{Config, MOST};
 use crate::clear_follow::plan::{PlanningInput, Walker, plan};
 
@@ -70,7 +70,9 @@ impl ClearFollow {
             |at: &Point2<f64>| people.iter().all(|p| nalgebra::distance(p, at) > PERSON_M);
         self.around.move_along(&scene.frame.motion, self.config.memory_s);
         if let Ok(depth) = scene.frame.depth() {
-            self.around.look(&scene.frame.camera, depth, self.config.heights_m, is_thing);
+            let mut look = Look::new();
+            look.add_depth(&scene.frame.camera, depth, self.config.heights_m, is_thing);
+            self.around.add_look(&look);
         }
     }
 

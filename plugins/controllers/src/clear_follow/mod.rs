@@ -11,7 +11,6 @@
 //! Things that a turn has moved out of the image are remembered: the inside of a corner is where a
 //! robot that follows a person hits it.
 
-mod around;
 mod config;
 mod control;
 mod plan;

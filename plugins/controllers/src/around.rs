@@ -1,7 +1,7 @@
 use std::f64::consts::TAU;
 
 use nalgebra::Point2;
-use tagalong_core::{DepthImage, EgoMotion};
+use tagalong_core::{DepthImage, EgoMotion, LaserScan};
 use tagalong_geometry::Camera;
 
 /// Directions around the robot.
@@ -15,7 +15,14 @@ const RANGE_M: f64 = 4.0;
 /// The nearest thing in each direction around the robot, seen or remembered.
 #[derive(Clone, Debug)]
 pub(crate) struct NearestObstacles {
-    things: Vec<Option<Obstacle>>,
+    things: [Option<Obstacle>; DIRECTIONS],
+}
+
+/// Nearest things in the sensors of one frame, and the directions that they show.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Look {
+    seen: [Option<Obstacle>; DIRECTIONS],
+    looked: [bool; DIRECTIONS],
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -27,7 +34,7 @@ struct Obstacle {
 
 impl NearestObstacles {
     pub(crate) fn new() -> Self {
-        Self { things: vec![None; DIRECTIONS] }
+        Self { things: [None; DIRECTIONS] }
     }
 
     /// The places of all things, robot frame, m.
@@ -37,7 +44,7 @@ impl NearestObstacles {
 
     /// Moves the memory along with the robot; points older than `memory_s` are forgotten.
     pub(crate) fn move_along(&mut self, motion: &EgoMotion, memory_s: f64) {
-        let before = std::mem::replace(&mut self.things, vec![None; DIRECTIONS]);
+        let before = std::mem::replace(&mut self.things, [None; DIRECTIONS]);
         for thing in before.into_iter().flatten() {
             let age_s = thing.age_s + motion.dt;
             if age_s <= memory_s {
@@ -46,9 +53,30 @@ impl NearestObstacles {
         }
     }
 
-    /// Adds a depth image: its points replace those remembered in the same directions. Points
-    /// between the `heights`, m, count for which `is_thing` returns true.
-    pub(crate) fn look(
+    /// Adds a look: its points replace those remembered in the same directions.
+    pub(crate) fn add_look(&mut self, look: &Look) {
+        // Directions that no sensor showed keep their memory.
+        for ((known, seen), looked) in self.things.iter_mut().zip(look.seen).zip(look.looked) {
+            if looked {
+                *known = seen;
+            }
+        }
+    }
+
+    fn add(&mut self, thing: Obstacle) {
+        if let Some(direction) = direction(&thing.at) {
+            keep_nearer(&mut self.things[direction], thing);
+        }
+    }
+}
+
+impl Look {
+    pub(crate) fn new() -> Self {
+        Self { seen: [None; DIRECTIONS], looked: [false; DIRECTIONS] }
+    }
+
+    /// Adds a depth image. Points between the `heights`, m, count for which `is_thing` returns true.
+    pub(crate) fn add_depth(
         &mut self,
         camera: &Camera,
         depth: &DepthImage,
@@ -58,8 +86,6 @@ impl NearestObstacles {
         // A grid of pixels is enough: an obstacle of some size covers many.
         let across = depth.width().div_ceil(COLUMNS).max(1);
         let down = depth.height().div_ceil(ROWS).max(1);
-        let mut seen = vec![None; DIRECTIONS];
-        let mut looked = [false; DIRECTIONS];
         for y in (0..depth.height()).step_by(down) {
             let row = depth.row(y);
             for x in (0..depth.width()).step_by(across) {
@@ -68,23 +94,35 @@ impl NearestObstacles {
                     continue;
                 }
                 let point = camera.back_project(Point2::new(x as f64, y as f64), z);
-                let at = point.xy();
-                let Some(direction) = direction(&at) else { continue };
-                looked[direction] = true;
-                if (heights[0]..heights[1]).contains(&point.z) && is_thing(&at) {
-                    keep_nearer(&mut seen[direction], Obstacle { at, age_s: 0.0 });
-                }
+                self.add_point(point.xy(), (heights[0]..heights[1]).contains(&point.z), &is_thing);
             }
-        }
-        // Directions that the image did not show keep their memory.
-        for (direction, thing) in seen.into_iter().enumerate().filter(|(d, _)| looked[*d]) {
-            self.things[direction] = thing;
         }
     }
 
-    fn add(&mut self, thing: Obstacle) {
-        if let Some(direction) = direction(&thing.at) {
-            keep_nearer(&mut self.things[direction], thing);
+    /// Adds a laser scan likewise: all of its points are things, whatever their height. A ray without a
+    /// reflection says nothing, so that its direction keeps its memory; one that ends far away says that
+    /// nothing is near.
+    pub(crate) fn add_scan(&mut self, scan: &LaserScan, is_thing: impl Fn(&Point2<f64>) -> bool) {
+        for point in scan.points.iter() {
+            let at = point.xy();
+            if at.coords.norm() >= RANGE_M && at.iter().all(|metres| metres.is_finite()) {
+                self.looked[direction_of(&at)] = true;
+            } else {
+                self.add_point(at, true, &is_thing);
+            }
+        }
+    }
+
+    fn add_point(
+        &mut self,
+        at: Point2<f64>,
+        counts: bool,
+        is_thing: impl Fn(&Point2<f64>) -> bool,
+    ) {
+        let Some(direction) = direction(&at) else { return };
+        self.looked[direction] = true;
+        if counts && is_thing(&at) {
+            keep_nearer(&mut self.seen[direction], Obstacle { at, age_s: 0.0 });
         }
     }
 }
@@ -106,12 +144,19 @@ fn direction(at: &Point2<f64>) -> Option<usize> {
     if !is_near {
         return None;
     }
+    Some(direction_of(at))
+}
+
+/// Returns the direction of a place, however far away.
+fn direction_of(at: &Point2<f64>) -> usize {
     let part = at.y.atan2(at.x).rem_euclid(TAU) / TAU;
-    Some((part * DIRECTIONS as f64) as usize % DIRECTIONS)
+    (part * DIRECTIONS as f64) as usize % DIRECTIONS
 }
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Point3;
+
     use super::*;
 
     #[test]
@@ -159,7 +204,9 @@ mod tests {
             |to: usize| DepthImage::from_fn(40, 30, move |x, _| if x < to { 1.0 } else { 3.0 });
         let mut around = NearestObstacles::new();
         let mut least = |depth: &DepthImage, heights, is_thing: &dyn Fn(&Point2<f64>) -> bool| {
-            around.look(&camera, depth, heights, is_thing);
+            let mut look = Look::new();
+            look.add_depth(&camera, depth, heights, is_thing);
+            around.add_look(&look);
             around.places().map(|at| at.coords.norm()).fold(9.0, f64::min)
         };
         assert!((least(&board(10), [0.1, 1.5], &all) - 1.0_f64.hypot(0.35)).abs() < 0.1);
@@ -169,5 +216,31 @@ mod tests {
         assert!(least(&unknown, [0.1, 1.5], &all) < 1.2, "nothing is seen, so it is still there");
         assert_eq!(least(&DepthImage::filled(40, 30, 1.0), [1.6, 1.9], &all), 9.0, "overhead");
         assert_eq!(least(&DepthImage::filled(40, 30, 1.0), [0.1, 1.5], &|_| false), 9.0, "people");
+    }
+
+    #[test]
+    fn a_scan_is_looked_at_all_around_and_the_nearer_of_two_sensors_counts() {
+        fn all(_: &Point2<f64>) -> bool {
+            true
+        }
+
+        let mut around = NearestObstacles::new();
+        let points = vec![Point3::new(-2.0, 0.1, 0.2), Point3::new(2.0, 0.05, 0.2)];
+        let scan = LaserScan::of_points(points);
+        let mut look = Look::new();
+        look.add_scan(&scan, all);
+        look.add_scan(&LaserScan::of_points(vec![Point3::new(1.0, 0.02, 0.2)]), all);
+        around.add_look(&look);
+        let places: Vec<_> = around.places().collect();
+        assert_eq!(places, [Point2::new(1.0, 0.02), Point2::new(-2.0, 0.1)]);
+        let mut people = Look::new();
+        people.add_scan(&scan, |_| false);
+        around.add_look(&people);
+        assert_eq!(around.places().count(), 0, "both directions show people alone");
+        around.add_look(&look);
+        let mut far = Look::new();
+        far.add_scan(&LaserScan::of_points(vec![Point3::new(9.0, 0.3, 0.2)]), all);
+        around.add_look(&far);
+        assert_eq!(around.places().count(), 1, "nothing is ahead any more");
     }
 }
