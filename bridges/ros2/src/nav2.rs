@@ -12,6 +12,7 @@ use std::time::{Duration, Instant};
 use ros2_client::action::{ActionClient, GoalId, GoalStatusEnum};
 use ros2_client::{Message, RmwRequestId};
 use serde::Serialize;
+use tagalong::core::Reason;
 
 use crate::wheels::{Driver, SwitchHandle};
 use crate::{BridgeError, threads};
@@ -32,6 +33,12 @@ const FEEDBACK: Duration = Duration::from_secs(2);
 const CONFIRM: Duration = Duration::from_millis(500);
 /// Longest wait for a confirmation when the bridge ends.
 const LAST_WAIT: Duration = Duration::from_secs(2);
+
+/// Returns true for a stop of the pipeline that ends the goal: what would stop its own commands stops
+/// those of the server, too. To have no target yet, or to have just begun, is no danger.
+pub(crate) fn stops(reason: Reason) -> bool {
+    !reason.moves() && !matches!(reason, Reason::NoTarget | Reason::Settling)
+}
 
 /// State of the goal for callers.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -420,5 +427,24 @@ where
 
     fn tell(&self, sentence: String) {
         lock(&self.shared).told.push(sentence);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_stops_the_pipeline_ends_the_goal() {
+        for reason in
+            [Reason::Blocked, Reason::TooClose, Reason::Frozen, Reason::Contact, Reason::Silent]
+        {
+            assert!(stops(reason), "{reason}");
+        }
+        for reason in
+            [Reason::Follow, Reason::Near, Reason::Slow, Reason::NoTarget, Reason::Settling]
+        {
+            assert!(!stops(reason), "{reason}");
+        }
     }
 }
