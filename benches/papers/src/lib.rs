@@ -20,6 +20,7 @@ mod joint_particle;
 mod lab;
 mod laser;
 mod omni_appearance;
+mod planners;
 mod printed;
 mod real;
 pub mod realism;
@@ -34,10 +35,11 @@ pub mod webcams;
 
 use tagalong_config::Registry;
 
-/// Registers all plugins of the workspace, and those of the printed equations.
+/// Registers all plugins of the workspace, those of the printed equations, and planners of others.
 pub fn register(registry: &mut Registry) {
     tagalong_catalog::register(registry);
     printed::register(registry);
+    planners::register(registry);
 }
 
 pub use findings::{Experiment, ExperimentFindings, Findings, Picture, System};

@@ -1,0 +1,265 @@
+//! `follow-bench-dwa`: the improved dynamic window approach of Follow-Bench.
+//!
+//! All pairs of speeds that the accelerations allow are driven for two seconds in thought. Four costs,
+//! each scaled to 0 to 1 over all pairs, are weighted: heading towards the goals at the beginning and at
+//! the end, distance from the first goal, inverse distance to obstacles, and slowness.
+
+use std::f64::consts::PI;
+
+use nalgebra::{Point2, Vector2};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tagalong_config::{Registry, check_settings};
+use tagalong_controllers::step_s;
+use tagalong_core::{Controller, Input, Inputs, Result, Scene, Twist};
+
+use super::obstacles::{PERSON_M, others, readings};
+use super::quarry::Quarry;
+
+/// Above this no length or speed on the floor makes sense, whatever the unit.
+const MOST: f64 = 1e6;
+/// Time step of the drives in thought, s, and their number.
+const STEP_S: f64 = 0.1;
+const STEPS: usize = 20;
+/// Distance between two speeds, as a part of the largest.
+const RESOLUTION: f64 = 0.02;
+/// Weights of heading, distance, obstacles and slowness.
+const WEIGHTS: [f64; 4] = [3.0, 2.0, 1.0, 0.5];
+/// Weight of the heading at the beginning; that at the end has the rest.
+const SHORT_TERM: f64 = 0.4;
+/// Weights of the first and the last step for the distance to obstacles.
+const OBSTACLE_WEIGHTS: [f64; 2] = [0.5, 1.0];
+/// Speed below which the robot is stuck, m/s.
+const STUCK_MPS: f64 = 0.01;
+/// Distance to an obstacle that is no less, m.
+const LEAST_M: f64 = 1e-6;
+/// Cost of a drive that begins in a collision.
+const COLLISION: f64 = 1e6;
+
+/// Settings of the controller `follow-bench-dwa`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// Distance kept from the surface of the person, m.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub distance_m: f64,
+    /// Radius of the robot, m.
+    #[schemars(range(min = 1e-6, max = 1e6))]
+    pub radius_m: f64,
+    /// Largest acceleration, m/s².
+    #[schemars(range(min = 1e-6, max = 1e6))]
+    pub max_acceleration: f64,
+    /// Largest angular acceleration, rad/s².
+    #[schemars(range(min = 1e-6, max = 1e6))]
+    pub max_angular_acceleration: f64,
+    /// Largest turn rate, rad/s.
+    #[schemars(range(min = 1e-6, max = 1e6))]
+    pub max_turn_rate: f64,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            distance_m: 1.5,
+            // Half of the diagonal of 0.7 by 0.55 m.
+            radius_m: 0.445,
+            max_acceleration: 2.0,
+            max_angular_acceleration: PI,
+            max_turn_rate: PI,
+        }
+    }
+}
+
+/// The planner.
+pub struct DynamicWindow {
+    config: Config,
+    quarry: Option<Quarry>,
+    last: Twist,
+}
+
+/// A drive in thought: its speeds, and the positions and headings after each step.
+struct Drive {
+    twist: Twist,
+    poses: [(Point2<f64>, f64); STEPS],
+}
+
+impl Drive {
+    fn new(twist: Twist) -> Self {
+        let mut place = Point2::origin();
+        let mut heading = 0.0;
+        let poses = std::array::from_fn(|_| {
+            place += Vector2::new(f64::cos(heading), f64::sin(heading)) * twist.linear_mps * STEP_S;
+            heading += twist.angular_rps * STEP_S;
+            (place, heading)
+        });
+        Self { twist, poses }
+    }
+
+    /// Returns the angle from the heading after a step to a goal, 0 to pi.
+    fn off_heading(&self, step: usize, goal: &Point2<f64>) -> f64 {
+        let (place, heading) = self.poses[step];
+        let way = goal - place;
+        let off = way.y.atan2(way.x) - heading;
+        off.sin().atan2(off.cos()).abs()
+    }
+
+    fn heading_cost(&self, first: &Point2<f64>, last: &Point2<f64>) -> f64 {
+        SHORT_TERM * self.off_heading(0, first)
+            + (1.0 - SHORT_TERM) * self.off_heading(STEPS - 1, last)
+    }
+
+    /// Returns the weighted mean of the inverse distances to the nearest obstacle.
+    fn obstacle_cost(&self, obstacles: &[Point2<f64>], collision_m: f64) -> f64 {
+        if obstacles.iter().any(|at| at.coords.norm() <= collision_m) {
+            return COLLISION;
+        }
+        let [from, to] = OBSTACLE_WEIGHTS;
+        let mut sum = 0.0;
+        let mut weights = 0.0;
+        for (step, (place, _)) in self.poses.iter().enumerate() {
+            let distances = obstacles.iter().map(|at| nalgebra::distance(at, place));
+            let least = (distances.fold(f64::INFINITY, f64::min) - collision_m).max(LEAST_M);
+            let weight = from + (to - from) * step as f64 / (STEPS - 1) as f64;
+            sum += weight / least;
+            weights += weight;
+        }
+        sum / weights
+    }
+}
+
+impl DynamicWindow {
+    /// Creates a planner of a robot at rest.
+    ///
+    /// # Errors
+    /// Settings outside their ranges.
+    pub fn new(config: Config) -> Result<Self> {
+        check_settings(&config)?;
+        Ok(Self { config, quarry: None, last: Twist::STOP })
+    }
+
+    /// Returns the speeds that the accelerations allow within a step, m/s and rad/s.
+    fn window(&self, max_mps: f64, max_rps: f64, dt_s: f64) -> Vec<Twist> {
+        let [linear, angular] = [
+            (self.last.linear_mps, self.config.max_acceleration * dt_s, max_mps),
+            (self.last.angular_rps, self.config.max_angular_acceleration * dt_s, max_rps),
+        ]
+        .map(|(last, change, most)| speeds(last - change, last + change, most));
+        linear.iter().flat_map(|v| angular.iter().map(|w| Twist::new(*v, *w))).collect()
+    }
+
+    fn steer(&self, scene: &Scene<'_>, quarry: &Quarry, dt_s: f64) -> Option<Twist> {
+        let max_mps = scene.max_speed_mps;
+        let half_m = scene.wheels.half_separation_m;
+        if ![max_mps, half_m].iter().all(|value| *value > 0.0 && *value <= MOST) {
+            return None;
+        }
+        let max_rps = self.config.max_turn_rate.min(max_mps / half_m);
+        let distance_m = self.config.distance_m + PERSON_M;
+        let horizon_s = STEP_S * STEPS as f64;
+        let [first, last] = [0.0, horizon_s].map(|s| quarry.goal(s, horizon_s, distance_m));
+        let mut obstacles = readings(scene, &quarry.place);
+        obstacles.extend(others(scene));
+        let collision_m = self.config.radius_m + PERSON_M;
+        let drives: Vec<Drive> =
+            self.window(max_mps, max_rps, dt_s).into_iter().map(Drive::new).collect();
+        let costs = [
+            scaled(drives.iter().map(|drive| drive.heading_cost(&first, &last))),
+            scaled(drives.iter().map(|drive| nalgebra::distance(&drive.poses[0].0, &first))),
+            scaled(drives.iter().map(|drive| drive.obstacle_cost(&obstacles, collision_m))),
+            scaled(drives.iter().map(|drive| max_mps - drive.twist.linear_mps)),
+        ];
+        let total = |drive: usize| -> f64 {
+            costs.iter().zip(WEIGHTS).map(|(cost, weight)| weight * cost[drive]).sum()
+        };
+        let best = (0..drives.len()).min_by(|a, b| total(*a).total_cmp(&total(*b)))?;
+        let twist = drives[best].twist;
+        let is_stuck = [twist, self.last].iter().all(|twist| twist.linear_mps.abs() < STUCK_MPS);
+        Some(if is_stuck { Twist::new(twist.linear_mps, -max_rps) } else { twist })
+    }
+}
+
+/// Returns speeds from `from` to `to` within the limit, evenly.
+fn speeds(from: f64, to: f64, most: f64) -> Vec<f64> {
+    let [from, to] = [from, to].map(|speed| speed.clamp(-most, most));
+    let count = ((to - from) / (RESOLUTION * most)) as usize + 1;
+    let step = (to - from) / (count - 1).max(1) as f64;
+    (0..count).map(|at| from + step * at as f64).collect()
+}
+
+/// Returns costs scaled to 0 to 1; 0 if they are all the same.
+fn scaled(costs: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut costs: Vec<f64> = costs.collect();
+    let least = costs.iter().copied().fold(f64::INFINITY, f64::min);
+    let range = costs.iter().copied().fold(f64::NEG_INFINITY, f64::max) - least;
+    for cost in &mut costs {
+        *cost = if range > 0.0 { (*cost - least) / range } else { 0.0 };
+    }
+    costs
+}
+
+impl Controller for DynamicWindow {
+    fn inputs(&self) -> Inputs {
+        Inputs::NONE.accept(Input::Laser)
+    }
+
+    fn command(&mut self, scene: &Scene<'_>) -> Twist {
+        let dt_s = step_s(&scene.frame.motion);
+        self.quarry = Quarry::next(self.quarry, scene);
+        let twist = self.quarry.and_then(|quarry| self.steer(scene, &quarry, dt_s));
+        self.last = twist.unwrap_or(Twist::STOP);
+        self.last
+    }
+
+    fn stand_off_m(&self) -> Option<f64> {
+        Some(self.config.distance_m + PERSON_M)
+    }
+}
+
+/// Registers the planner.
+pub(super) fn register(registry: &mut Registry) {
+    registry.controller(
+        "follow-bench-dwa",
+        "follows by the improved dynamic window approach of Follow-Bench",
+        |config: Config, _| DynamicWindow::new(config),
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_window_has_the_speeds_that_can_be_reached() {
+        let linear = speeds(-0.2, 0.2, 2.0);
+        assert_eq!(linear.len(), 11);
+        assert!((linear[0] + 0.2).abs() < 1e-12 && (linear[10] - 0.2).abs() < 1e-12);
+        assert_eq!(speeds(1.9, 2.3, 2.0).last(), Some(&2.0));
+        assert_eq!(speeds(2.5, 3.0, 2.0), [2.0]);
+    }
+
+    #[test]
+    fn costs_are_scaled_over_all_drives() {
+        assert_eq!(scaled([3.0, 1.0, 2.0].into_iter()), [1.0, 0.0, 0.5]);
+        assert_eq!(scaled([3.0, 3.0].into_iter()), [0.0, 0.0]);
+    }
+
+    #[test]
+    fn a_drive_past_an_obstacle_costs_less_the_farther_it_is() {
+        let drive = Drive::new(Twist::new(1.0, 0.0));
+        let cost = |y: f64| drive.obstacle_cost(&[Point2::new(1.0, y)], 0.745);
+        assert!(cost(0.8) > cost(1.5) && cost(1.5) > cost(4.0));
+        assert_eq!(drive.obstacle_cost(&[Point2::new(0.5, 0.0)], 0.745), COLLISION);
+        assert_eq!(drive.obstacle_cost(&[], 0.745), 0.0);
+    }
+
+    #[test]
+    fn headings_count_at_the_beginning_and_at_the_end() {
+        let ahead = Drive::new(Twist::new(1.0, 0.0));
+        let goal = Point2::new(5.0, 0.0);
+        assert_eq!(ahead.heading_cost(&goal, &goal), 0.0);
+        let aside = ahead.heading_cost(&Point2::new(0.1, 1.0), &goal);
+        assert!((aside - SHORT_TERM * 0.5 * PI).abs() < 1e-9, "{aside}");
+        let turns = Drive::new(Twist::new(0.0, 0.5));
+        assert!((turns.heading_cost(&goal, &goal) - (0.4 * 0.05 + 0.6)).abs() < 1e-9);
+    }
+}
