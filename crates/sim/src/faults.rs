@@ -532,7 +532,7 @@ mod tests {
             ("kind = \"drop\"\nshare = 0.5", "drop has no share"),
             ("kind = \"drop\"\nsize = 0.5", "drop has no size"),
             ("kind = \"delay\"\nsize = -1.0", "must be in 0 to 60"),
-            ("kind = \"delay\"\nat_s = nan", "at_s of delay must be in"),
+            ("kind = \"delay\"\nat_s = nan", "at_s` must be a finite number"),
             ("share = 0.5", "name one"),
             ("kind = \"dark-columns\"\nshare = 1.5", "must be in 0 to 1"),
         ] {
