@@ -54,16 +54,10 @@ mod tests {
         let person =
             Person { position: Point3::new(3.0, 0.5, 1.6), velocity: Vector2::new(1.0, 0.2) };
         let covariance = SMatrix::from_diagonal(&[0.4, 0.1, 0.2, 0.6, 0.3].into());
-        let track = Track {
-            id: TrackId(7),
-            estimate: Estimate { person, covariance, region: Rect::default() },
-            seen: true,
-            occluded: true,
-            confirmed: true,
-            age: 3,
-            unseen_s: 0.5,
-            score: 2.0,
-        };
+        let track = Track::new(TrackId(7), Estimate::new(person, covariance, Rect::default()), 2.0)
+            .with_occluded(true)
+            .with_age(3)
+            .with_unseen_s(0.5);
         let turn = FRAC_PI_2;
         let motion = EgoMotion { forward: 1.0, turn, ..EgoMotion::at_rest(0.25) };
         let held = held(&track, &motion, &Camera::blind(one()));

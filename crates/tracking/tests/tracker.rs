@@ -83,7 +83,7 @@ impl Detector for Script {
     fn capabilities(&self) -> Capabilities {
         let awaited = Inputs::NONE.require(Input::Detections);
         let inputs = if self.awaits_message { awaited } else { Inputs::NONE };
-        Capabilities { inputs, discovers: true, tracks: true, weighs: true }
+        Capabilities::new(inputs).discovering().tracking().weighing()
     }
 
     fn detect(
@@ -234,15 +234,15 @@ fn a_person_behind_another_is_not_searched_for_and_not_missed() {
 
 #[test]
 fn a_detection_that_a_search_found_must_fit_its_track() {
-    let sharp = Detection { covariance: Matrix3::identity() * 1e-4, ..person(3.0, 0.0) };
+    let sharp = person(3.0, 0.0).with_covariance(Matrix3::identity() * 1e-4);
     let script = Script::of([sharp.clone()]);
     let follower = Script::default();
     let detectors = vec![script.slot(&[Role::Discover]), follower.slot(&[Role::Track])];
     let mut tracker = Tracker::new(Parts { detectors, ..parts() }, TrackerSettings::default());
     run(&mut tracker, 1..=2);
     script.show([]);
-    let unlikely = Detection { score: -9.0, ..sharp.clone() };
-    let grown = Detection { position: Point3::new(3.0, 0.3, 1.9), ..sharp };
+    let unlikely = sharp.clone().with_score(-9.0);
+    let grown = sharp.with_position(Point3::new(3.0, 0.3, 1.9));
     follower.show([unlikely, grown, person(3.0, 0.05)]);
     let report = run(&mut tracker, 3..=3);
     assert_eq!([report.funnel.count("score"), report.funnel.count("gate")], [1, 1]);
@@ -381,12 +381,9 @@ impl Associator for Pairs {
             return Associations::default();
         }
         let pairs = self.0.iter();
-        let pairs = pairs.map(|(track, detection, weight)| Association {
-            track: *track,
-            detection: *detection,
-            weight: *weight,
-        });
-        Associations { pairs: pairs.collect(), spent: Vec::new() }
+        let pairs =
+            pairs.map(|(track, detection, weight)| Association::new(*track, *detection, *weight));
+        Associations::new(pairs.collect())
     }
 }
 
@@ -428,8 +425,9 @@ struct Odd {
 
 impl Filter for Odd {
     fn requirements(&self) -> FilterRequirements {
-        let image_box = self.wants_boxes;
-        FilterRequirements { searches: true, image_box, ..FilterRequirements::default() }
+        let mut requirements = FilterRequirements::new(Inputs::NONE).with_search();
+        requirements.image_box = self.wants_boxes;
+        requirements
     }
 
     fn start(&mut self, id: TrackId, _: &Detection, _: &Camera) {
@@ -445,9 +443,9 @@ impl Filter for Odd {
         let mut answer: BTreeMap<TrackId, Update> = BTreeMap::new();
         for (at, id) in self.tracks.iter().enumerate() {
             let nis = if at == 0 { 2.5 } else { f64::NAN };
-            answer.insert(*id, Update { nis: Some((nis, 3)) });
+            answer.insert(*id, Update::new(Some((nis, 3))));
         }
-        answer.insert(TrackId(99), Update { nis: Some((1.0, 3)) });
+        answer.insert(TrackId(99), Update::new(Some((1.0, 3))));
         if evidence.frame.index == 3 {
             answer.clear();
         }
@@ -461,7 +459,7 @@ impl Filter for Odd {
             let position = Point3::new(x, f64::from(id.0) - 1.0, 1.6);
             let person = Person { position, velocity: Vector2::zeros() };
             let region = camera.upper_body(&position);
-            all.insert(*id, Estimate { person, covariance: SMatrix::identity() * 0.01, region });
+            all.insert(*id, Estimate::new(person, SMatrix::identity() * 0.01, region));
         }
         all
     }

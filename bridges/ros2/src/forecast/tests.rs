@@ -19,16 +19,7 @@ fn person(at: [f64; 2], velocity: [f64; 2], deviations: [f64; 2]) -> Track {
     let covariance = SMatrix::<f64, 5, 5>::from_diagonal(&[place, place, 0.0, speed, speed].into());
     let person =
         Person { position: Point3::new(at[0], at[1], 1.6), velocity: Vector2::from(velocity) };
-    Track {
-        id: TrackId(1),
-        estimate: Estimate { person, covariance, region: Rect::default() },
-        seen: true,
-        occluded: false,
-        confirmed: true,
-        age: 10,
-        unseen_s: 0.0,
-        score: 3.0,
-    }
+    Track::new(TrackId(1), Estimate::new(person, covariance, Rect::default()), 3.0).with_age(10)
 }
 
 fn frame_at(stamp_s: f64) -> Frame {
@@ -73,7 +64,7 @@ fn a_person_is_occupied_the_rest_of_the_view_free_and_what_is_outside_unknown() 
     let leaving = [person([0.5, 0.0], [-1.0, 0.0], [0.05, 0.1])];
     assert!(value(&made(&SETTINGS, &leaving, Isometry2::identity()), -1.05, 0.05) > 10);
     assert!((-1..=100).contains(&grid.data.iter().copied().min().unwrap()));
-    let tentative = Track { confirmed: false, ..tracks[0].clone() };
+    let tentative = tracks[0].clone().with_confirmed(false);
     let empty = made(&SETTINGS, &[tentative], Isometry2::identity());
     assert_eq!(value(&empty, 3.05, 1.05), 0);
 }

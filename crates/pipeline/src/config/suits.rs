@@ -9,7 +9,6 @@ pub(super) const TABLE: &str = "suits";
 /// `tagalong doctor` warns of them, too.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
-#[non_exhaustive]
 pub struct Suits {
     /// Lowest and highest camera above the floor, m.
     pub camera_height_m: Option<[f64; 2]>,

@@ -269,7 +269,7 @@ fn the_nearer_person_covers_the_farther_one() {
     assert!(covers(&near, &far) && !covers(&far, &near));
     let same = far.clone().with_id(TrackId(1));
     assert!(!covers(&near, &same), "nobody covers themselves");
-    let beside = Track { id: TrackId(3), ..near.clone() };
+    let beside = near.clone().with_id(TrackId(3));
     assert!(!covers(&near, &beside) && !covers(&beside, &near), "neither is nearer");
     far.estimate.region.x += 2.0 * far.estimate.region.width;
     assert!(!covers(&near, &far), "beside each other in the image");
@@ -304,7 +304,7 @@ fn a_track_takes_over_a_number_soon_after_its_start_or_never() {
         let image = frame(RED, BLUE);
         scene.show(30, &image, &[track(1, 0.8, 1.6)]);
         scene.show(20, &image, &[]);
-        let hidden = Track { occluded: true, ..track(2, 0.8, 1.6) };
+        let hidden = track(2, 0.8, 1.6).with_occluded(true);
         scene.show(hidden_frames, &image, &[hidden]);
         scene.show(10, &image, &[track(2, 0.8, 1.6)])[0]
     }
