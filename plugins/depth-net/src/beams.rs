@@ -201,6 +201,28 @@ mod tests {
         assert_eq!(range_m(0.3, -0.2, 0.9), None, "the lidar itself");
     }
 
+    /// The cells of 2 degrees above the horizon and of 1 degree to the left of ahead.
+    #[test]
+    fn of_the_beams_in_one_direction_that_in_its_middle_counts() {
+        fn beam([left_deg, above_deg, range_m]: [f64; 3]) -> Point3<f64> {
+            let (left_sine, left_cosine) = left_deg.to_radians().sin_cos();
+            let (above_sine, above_cosine) = above_deg.to_radians().sin_cos();
+            let level_m = range_m * above_cosine;
+            Point3::new(level_m * left_cosine, level_m * left_sine, range_m * above_sine)
+        }
+
+        for off_deg in [[0.1, 1.0], [0.9, 1.0], [0.5, 0.2], [0.5, 1.8]] {
+            let [left_deg, above_deg] = off_deg;
+            let both = [[left_deg, above_deg, 2.0], [0.45, 1.1, 3.0]];
+            for points in [both, [both[1], both[0]]] {
+                let points = points.map(beam).to_vec().into();
+                let beams = Beams::new(&PointCloud { scanner: Point3::origin(), points });
+                let range_m = beams.range_m(&beam([0.6, 0.7, 9.0])).unwrap();
+                assert!((range_m - 3.0).abs() < 1e-6, "{off_deg:?}: {range_m}");
+            }
+        }
+    }
+
     #[test]
     fn a_quarter_and_back_is_where_it_was() {
         let point = Point3::new(2.0, 0.5, 1.0);

@@ -286,6 +286,15 @@ mod tests {
         assert!(reduced(&small, &DepthImage::filled(80, 60, 1.0)).is_none());
         let ray = camera.ray(Point2::new(10.0, 20.0)) - large.ray(Point2::new(21.0, 41.0));
         assert!(ray.norm() < 1e-12);
+        let lens =
+            Pinhole { fx: 960.0, fy: 960.0, cx: 639.5, cy: 479.5, distortion: Distortion::None };
+        let huge = Camera::mounted(lens, 1280, 960, 1.0, 0.0, 0.0);
+        let depth = DepthImage::from_fn(1280, 960, |x, y| (x + 2000 * y) as f32);
+        let (fourth, thinned) = reduced(&huge, &depth).unwrap();
+        assert_eq!((thinned.width(), thinned.height(), fourth.height), (320, 240, 240));
+        assert_eq!(thinned.row(20)[10], (42 + 2000 * 82) as f32, "every fourth from the third on");
+        let ray = fourth.ray(Point2::new(10.0, 20.0)) - huge.ray(Point2::new(42.0, 82.0));
+        assert!(ray.norm() < 1e-12);
         let [a, b] = [
             FloorMap::new(&small, &DepthImage::filled(80, 60, 2.53)),
             FloorMap::new(&camera, &image),

@@ -333,6 +333,11 @@ mod tests {
         let half = person(&head, 8.0, |x, _| x as f64 >= at.x);
         let found = measured(head, &half).unwrap();
         assert_eq!(found.xy(), head.xy(), "half a face is not in the middle");
+        // A head and its border reach 13 pixels to each side.
+        for is_read in [|x: f64| x >= -10.0, |x: f64| x <= 10.0] {
+            let most = person(&head, 8.0, |x, _| is_read(x as f64 - at.x));
+            assert_eq!(measured(head, &most).unwrap().xy(), head.xy(), "an ear is cut off");
+        }
         assert!((found.z - head.z).abs() < 0.06, "{found}");
     }
 
@@ -360,6 +365,37 @@ mod tests {
         for (area_m2, expected_m2) in areas_m2.iter().zip(parts) {
             assert!((area_m2 - expected_m2).abs() < 1e-12, "{areas_m2:?}");
         }
+        let sum_m2: f64 = areas_m2.iter().sum();
+        assert!((sum_m2 - sample.area_m2()).abs() < 1e-12, "nothing of it is lost: {sum_m2}");
+    }
+
+    #[test]
+    fn a_head_ends_where_its_last_thin_layer_does() {
+        fn top(layers: std::ops::Range<usize>, above: f64) -> Option<f64> {
+            let mut areas = [0.0; LAYERS];
+            areas[layers.clone()].fill(2.0 * LEAST_AREA_M2);
+            areas[layers.end] = above * LEAST_AREA_M2;
+            top_of(&areas)
+        }
+
+        for (above, beyond) in [(0.0, 0.0), (0.4, 0.2), (0.9, 0.45)] {
+            let found = top(10..20, above).unwrap() / LAYER_M;
+            assert!((found - 20.0 - beyond).abs() < 1e-9, "{above}: {found}");
+        }
+        assert!(top(10..17, 0.0).is_some(), "12 cm below the top layer");
+        assert_eq!(top(10..16, 0.0), None, "too flat");
+        assert!(top(10..LAYERS - 2, 0.0).is_some());
+        assert_eq!(top(10..LAYERS - 1, 0.0), None, "it may go on above");
+    }
+
+    #[test]
+    fn the_readings_of_a_small_image_end_where_it_does() {
+        let all = Readings::new(&DepthImage::filled(30, 20, 2.0));
+        assert_eq!(all.0, Rect::new(0.0, 0.0, 29.0, 20.0));
+        let some = DepthImage::from_fn(30, 20, |x, y| {
+            if (4..25).contains(&x) && y >= 3 { 2.0 } else { f32::NAN }
+        });
+        assert_eq!(Readings::new(&some).0, Rect::new(4.0, 3.0, 20.0, 17.0));
     }
 
     #[test]
