@@ -82,6 +82,9 @@ impl MirrorSettings {
     }
 }
 
+/// A ray that leaves the mirror: group and lane of its pixel, its start and its direction.
+type MirrorRay = ((usize, usize), Point3<f64>, Vector3<f64>);
+
 /// A panorama camera.
 #[derive(Clone, Debug)]
 pub struct MirrorCamera {
@@ -301,10 +304,7 @@ impl Count {
 
 /// The solids that any of some rays may meet: those whose surrounding ball
 /// reaches into a cone about all of them.
-fn within_reach<'a>(
-    world: &'a World,
-    rays: &[((usize, usize), Point3<f64>, Vector3<f64>)],
-) -> Vec<(Option<u16>, &'a Shape)> {
+fn within_reach<'a>(world: &'a World, rays: &[MirrorRay]) -> Vec<(Option<u16>, &'a Shape)> {
     let Some((_, eye, _)) = rays.get(rays.len() / 2) else { return Vec::new() };
     let axis = rays.iter().map(|ray| ray.2).sum::<Vector3<f64>>();
     let Some(axis) = axis.try_normalize(1e-3) else { return world.solids().collect() };

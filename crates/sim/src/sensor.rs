@@ -632,7 +632,7 @@ mod tests {
                 let there = seen.get(x as i64 + off(0x54), y as i64 + off(0x55));
                 let hit = there.unwrap_or_else(|| seen.get(x as i64, y as i64).unwrap());
                 let light = hit.infrared * hit.facing.max(0.0) / (hit.t * hit.t);
-                let coarse = 0.5 + uniform_at(seed ^ 0x51, (y / 4) << 20 | x / 4);
+                let coarse = 0.5 + uniform_at(seed ^ 0x51, ((y / 4) << 20) | (x / 4));
                 let fine = 0.75 + 0.5 * uniform_at(seed ^ 0x52, y << 20 | x);
                 let steps = STEPS_PER_PX * SENSOR.focal_px * SENSOR.baseline_m;
                 let disparity = (steps / hit.t + normal_at(seed ^ 0x53, key) / 6.0).round();
