@@ -1,16 +1,16 @@
 """Prints how the time of a frame grows with people, image size and length of the log.
 
-Usage: python3 benches/scale.py [TAGALONG] [CONFIG...]   (from the root of the repository)
+Usage: python3 benches/scale.py [--memory] [TAGALONG] [CONFIG...]   (from the root of the repository)
 
 TAGALONG is the program (target/release/tagalong); the configs are pipelines for colour and
 depth (configs/depth-ekf.toml and configs/joint-particle.toml). Each row is a simulated crowd
 that is recorded once and tracked on one thread. `frame` is all that the pipeline does with a
-frame, `read` the wait for the next one.
+frame, `read` the wait for the next one. With --memory it prints how memory grows with the length of
+the log instead: the largest memory of a run, and what each further frame adds to it.
 """
 
 import json
 import os
-import resource
 import subprocess
 import sys
 import tempfile
@@ -35,22 +35,29 @@ ROWS = (
 )
 
 
+LENGTHS_S = (20, 100, 400, 1200)
+"""Of logs with small images, for --memory."""
+
+
 def quietly(command):
-    done = subprocess.run(command, capture_output=True, text=True)
-    if done.returncode != 0:
-        sys.exit(f"{' '.join(command)}: {done.stderr}")
+    """What the command used."""
+    with tempfile.TemporaryFile() as said:
+        started = subprocess.Popen(command, stdout=said, stderr=said)
+        # Of this child alone: the sum over all children has the largest memory of any of them.
+        _, status, used = os.wait4(started.pid, 0)
+        started.returncode = os.waitstatus_to_exitcode(status)
+        if started.returncode != 0:
+            said.seek(0)
+            sys.exit(f"{' '.join(command)}: {said.read().decode(errors='replace')}")
+    return used
 
 
 def tracked(program, config, log, folder):
     out = os.path.join(folder, "out")
-    command = [program, "run", config, log, "-o", out, "--overwrite", "--threads", "1"]
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    quietly(command)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    used = quietly([program, "run", config, log, "-o", out, "--overwrite", "--threads", "1"])
     with open(os.path.join(out, "timings.json"), encoding="utf-8") as file:
         times = json.load(file)
-    busy_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return times["whole frame"], times["read"], busy_s
+    return times["whole frame"], times["read"], used
 
 
 def recorded(program, settings, folder):
@@ -66,6 +73,27 @@ def recorded(program, settings, folder):
     return log
 
 
+def memory(program="target/release/tagalong", *configs):
+    configs = configs or ("configs/depth-ekf.toml",)
+    print("| pipeline | log [s] | frames | memory [MiB] | more for each further frame [KiB] |")
+    print("|---|---|---|---|---|")
+    with tempfile.TemporaryDirectory() as folder:
+        before = {}
+        for length in LENGTHS_S:
+            settings = BASE | {"people": 2, "length": length, "width": 64, "height": 48}
+            log = recorded(program, settings, folder)
+            for config in configs:
+                frame, _, used = tracked(program, config, log, folder)
+                name = os.path.basename(config).removesuffix(".toml")
+                frames, kib = frame["frames"], used.ru_maxrss
+                more = "-"
+                if config in before:
+                    frames_before, kib_before = before[config]
+                    more = f"{(kib - kib_before) / (frames - frames_before):.2f}"
+                before[config] = (frames, kib)
+                print(f"| {name} | {length} | {frames} | {kib / 1024:.1f} | {more} |", flush=True)
+
+
 def main(program="target/release/tagalong", *configs):
     configs = configs or ("configs/depth-ekf.toml", "configs/joint-particle.toml")
     print("| pipeline | frames | frame p50 [ms] | p99 | worst | read p50 | processor [ms/frame] |")
@@ -75,7 +103,8 @@ def main(program="target/release/tagalong", *configs):
             settings = BASE | row
             log = recorded(program, settings, folder)
             for config in configs:
-                frame, read, busy_s = tracked(program, config, log, folder)
+                frame, read, used = tracked(program, config, log, folder)
+                busy_s = used.ru_utime + used.ru_stime
                 name = os.path.basename(config).removesuffix(".toml")
                 size = f"{settings['width']}x{settings['height']}"
                 people = f"{settings['people']} {'person' if settings['people'] == 1 else 'people'}"
@@ -88,6 +117,11 @@ def main(program="target/release/tagalong", *configs):
                 print("| " + " | ".join([*map(str, cells), *times]) + " |", flush=True)
 
 
-if any(argument.startswith("-") for argument in sys.argv[1:]):
+arguments = sys.argv[1:]
+job = main
+if arguments[:1] == ["--memory"]:
+    job = memory
+    arguments = arguments[1:]
+if any(argument.startswith("-") for argument in arguments):
     sys.exit(__doc__)
-main(*sys.argv[1:])
+job(*arguments)

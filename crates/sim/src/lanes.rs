@@ -41,16 +41,14 @@ impl Vectors {
     }
 }
 
-/// Returns the points `t` lengths of the rays away from an eye.
+/// Writes the points `t` lengths of the rays away from an eye.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub fn points(eye: &Point3<f64>, rays: &Vectors, t: &Lanes) -> Vectors {
-    let mut points = Vectors::ZERO;
+pub fn points(eye: &Point3<f64>, rays: &Vectors, t: &Lanes, to: &mut Vectors) {
     for lane in 0..LANES {
-        points.x[lane] = eye.x + rays.x[lane] * t[lane];
-        points.y[lane] = eye.y + rays.y[lane] * t[lane];
-        points.z[lane] = eye.z + rays.z[lane] * t[lane];
+        to.x[lane] = eye.x + rays.x[lane] * t[lane];
+        to.y[lane] = eye.y + rays.y[lane] * t[lane];
+        to.z[lane] = eye.z + rays.z[lane] * t[lane];
     }
-    points
 }
 
 /// Returns the product of a matrix and a vector, in the order of operations of `nalgebra`, whose

@@ -4,18 +4,19 @@
 use nalgebra::{Isometry3, Point2, Point3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::Image;
 use tagalong_geometry::{Camera, ConicalMirror, Distortion, Lens, Panorama, Pinhole, Rect};
 
 use crate::camera_settings::CameraSettings;
+use crate::hits::{HitGroup, HitImage};
+use crate::lanes::LANES;
 use crate::parallel::in_pieces;
 use crate::random::Random;
 use crate::render::Visibility;
 use crate::shape::Shape;
-use crate::world::{Hit, World};
+use crate::world::World;
 
 /// Side of a tile, pixels.
-const TILE: usize = 16;
+const TILE: usize = LANES;
 /// The mirror fills the image up to this part of half its smaller side.
 const FILLED: f64 = 0.97;
 
@@ -72,6 +73,9 @@ impl MirrorSettings {
         )]
     }
 }
+
+/// A ray that leaves the mirror: group and lane of its pixel, its start and its direction.
+type MirrorRay = ((usize, usize), Point3<f64>, Vector3<f64>);
 
 /// A panorama camera.
 #[derive(Clone, Debug)]
@@ -175,33 +179,34 @@ impl MirrorCamera {
         world: &World,
         world_from_camera: &Isometry3<f64>,
         threads: usize,
-    ) -> Image<Hit> {
+    ) -> HitImage {
         let (width, height) = self.size;
-        let mut image = Image::filled(width, height, Hit::NOTHING);
-        in_pieces(image.pixels_mut(), TILE * width, threads, |number, pixels| {
-            self.strip(world, world_from_camera, number * TILE, pixels);
+        let mut image = HitImage::nothing(width, height);
+        let strip = TILE * image.row_groups();
+        in_pieces(image.groups_mut(), strip, threads, |number, groups| {
+            self.strip(world, world_from_camera, number * TILE, groups);
         });
         image
     }
 
-    fn strip(&self, world: &World, pose: &Isometry3<f64>, top: usize, pixels: &mut [Hit]) {
+    fn strip(&self, world: &World, pose: &Isometry3<f64>, top: usize, groups: &mut [HitGroup]) {
         let width = self.size.0;
+        let row_groups = width.div_ceil(LANES);
         let mut rays = Vec::with_capacity(TILE * TILE);
-        for left in (0..width).step_by(TILE) {
-            let columns = left..(left + TILE).min(width);
+        for tile in 0..row_groups {
             rays.clear();
-            for at in
-                (0..pixels.len()).step_by(width).flat_map(|s| columns.clone().map(move |c| s + c))
-            {
-                if let Some((from, along)) =
-                    self.ray((at % width) as f64, (top + at / width) as f64)
-                {
-                    rays.push((at, pose * from, pose.rotation * along));
+            for row in 0..groups.len() / row_groups {
+                for lane in 0..LANES.min(width - tile * LANES) {
+                    let column = (tile * LANES + lane) as f64;
+                    if let Some((from, along)) = self.ray(column, (top + row) as f64) {
+                        let at = (row * row_groups + tile, lane);
+                        rays.push((at, pose * from, pose.rotation * along));
+                    }
                 }
             }
             let seen = within_reach(world, &rays);
-            for (at, from, along) in &rays {
-                pixels[*at] = world.first(seen.iter().copied(), from, along);
+            for ((group, lane), from, along) in &rays {
+                groups[*group].set(*lane, &world.first(seen.iter().copied(), from, along));
             }
         }
     }
@@ -211,7 +216,7 @@ impl MirrorCamera {
     /// raw image shows, unwrapped by the calibration in the log.
     pub fn sight(
         &self,
-        raw: &Image<Hit>,
+        raw: &HitImage,
         world_from_camera: &Isometry3<f64>,
         (person, shapes): (u16, &[Shape]),
         head_in_world: &Point3<f64>,
@@ -231,7 +236,7 @@ impl MirrorCamera {
     /// At most some 40 x 40 rays are cast.
     fn visibility(
         &self,
-        raw: &Image<Hit>,
+        raw: &HitImage,
         pose: &Isometry3<f64>,
         (person, shapes): (u16, &[Shape]),
         region: &Rect,
@@ -291,10 +296,7 @@ impl Count {
 
 /// The solids that any of some rays may meet: those whose surrounding ball
 /// reaches into a cone about all of them.
-fn within_reach<'a>(
-    world: &'a World,
-    rays: &[(usize, Point3<f64>, Vector3<f64>)],
-) -> Vec<(Option<u16>, &'a Shape)> {
+fn within_reach<'a>(world: &'a World, rays: &[MirrorRay]) -> Vec<(Option<u16>, &'a Shape)> {
     let Some((_, eye, _)) = rays.get(rays.len() / 2) else { return Vec::new() };
     let axis = rays.iter().map(|ray| ray.2).sum::<Vector3<f64>>();
     let Some(axis) = axis.try_normalize(1e-3) else { return world.solids().collect() };
@@ -425,7 +427,7 @@ mod tests {
         let world = World::new(&Arc::new(Stage::new(Vec::new(), Vec::new(), 100.0)), people);
         let image = camera.draw(&world, &Isometry3::identity(), 2);
         let mut met = 0;
-        for (at, hit) in image.pixels().iter().enumerate() {
+        for (at, hit) in image.hits().iter().enumerate() {
             let ray = camera.ray((at % 96) as f64, (at / 96) as f64);
             let meets = ray.is_some_and(|(from, along)| {
                 balls.iter().any(|ball| ball.meet(&from, &along).is_some())

@@ -4,15 +4,16 @@
 //! draws the same image.
 
 use nalgebra::{Isometry3, Matrix3, Point2, Point3, Vector3};
-use tagalong_core::Image;
 use tagalong_geometry::{Camera, Distortion, Lens, Pinhole};
 
-use crate::lanes::{LANES, Lanes, Vectors, points, product};
+use crate::hits::{HitGroup, HitImage};
+use crate::lanes::{LANES, Vectors, product};
 use crate::parallel::in_pieces;
-use crate::seen::{Met, SolidView};
+use crate::seen::SolidView;
 use crate::shape::Shape;
 use crate::sight::{SightedSolid, before, between};
-use crate::world::{Hit, Shine, World};
+use crate::tile::{Tile, TileParts};
+use crate::world::World;
 
 /// Side of a tile, pixels.
 const TILE: usize = LANES;
@@ -24,7 +25,7 @@ pub fn draw(
     camera: &Camera,
     world_from_robot: &Isometry3<f64>,
     threads: usize,
-) -> Image<Hit> {
+) -> HitImage {
     WorldCamera { world, camera, pose: &|_| *world_from_robot, lit: true }.draw(threads)
 }
 
@@ -44,30 +45,39 @@ pub struct WorldCamera<'a> {
 
 impl WorldCamera<'_> {
     /// Renders the surface that the ray of each pixel meets.
-    pub fn draw(&self, threads: usize) -> Image<Hit> {
-        let mut image = Image::filled(self.camera.width, self.camera.height, Hit::NOTHING);
-        in_pieces(image.pixels_mut(), TILE * self.camera.width, threads, |number, pixels| {
-            self.strip(number * TILE, pixels);
-        });
+    pub fn draw(&self, threads: usize) -> HitImage {
+        let mut image = HitImage::nothing(self.camera.width, self.camera.height);
+        self.draw_over(&mut image, threads);
         image
     }
 
-    fn strip(&self, top: usize, pixels: &mut [Hit]) {
+    /// Renders the surface that the ray of each pixel meets over an earlier image of the same size,
+    /// which saves the time that new memory takes.
+    pub fn draw_over(&self, image: &mut HitImage, threads: usize) {
+        let strip = TILE * image.row_groups();
+        in_pieces(image.groups_mut(), strip, threads, |number, groups| {
+            self.strip(number * TILE, groups);
+        });
+    }
+
+    fn strip(&self, top: usize, groups: &mut [HitGroup]) {
         let width = self.camera.width;
-        let rows = pixels.len() / width;
+        let row_groups = width.div_ceil(TILE);
+        let rows = groups.len() / row_groups;
         let eye = self.eye(top);
         let sights = before(self.world.solids(), &eye.at, &eye.forward());
         let edge = |y: usize| [eye.corner(0, y), eye.corner(width, y)];
         let strip = between(&sights, edge(top), edge(top + rows));
-        for left in (0..width).step_by(TILE) {
+        let mut tile = Tile::default();
+        for number in 0..row_groups {
+            let left = number * TILE;
             let right = width.min(left + TILE);
             let edge = |x: usize| [eye.corner(x, top), eye.corner(x, top + rows)];
-            let tile = between(strip.iter().copied(), edge(left), edge(right));
-            for row in 0..rows {
-                let rays = eye.rays(left, 1, top + row);
-                let pixels = &mut pixels[row * width..][left..right];
-                self.look(&tile, &eye.at, &rays, pixels);
-            }
+            let solids = between(strip.iter().copied(), edge(left), edge(right));
+            let rays = |row: usize, to: &mut Vectors| eye.rays([left, 1, top + row], to);
+            tile.look(&solids, &eye.at, [right - left, rows], rays);
+            let columns = groups.iter_mut().skip(number).step_by(row_groups);
+            self.paint(&mut tile, &solids, &eye.at, &mut columns.collect::<Vec<_>>());
         }
     }
 
@@ -90,7 +100,7 @@ impl WorldCamera<'_> {
     /// some 40 x 40 rays are cast.
     pub fn visibility(
         &self,
-        image: &Image<Hit>,
+        image: &HitImage,
         (person, shapes): (u16, &[Shape]),
         area: [usize; 4],
     ) -> Visibility {
@@ -105,10 +115,14 @@ impl WorldCamera<'_> {
             let alone: Vec<_> = shapes.iter().map(|shape| shape.seen_from(&eye.at)).collect();
             let columns = || (left..right).step_by(step);
             let groups = columns().step_by(LANES);
-            let met = groups.flat_map(|first| meet_any(&alone, &eye.rays(first, step, row)));
+            let mut rays = Vectors::ZERO;
+            let met = groups.flat_map(|first| {
+                eye.rays([first, step, row], &mut rays);
+                meet_any(&alone, &rays)
+            });
             for (column, _) in columns().zip(met).filter(|(_, met)| *met != 0) {
                 whole += 1;
-                let there = image.pixels()[row * image.width() + column].person;
+                let there = image.person(column, row);
                 if there == Some(person) {
                     seen += 1;
                     let x = column as f64;
@@ -127,70 +141,53 @@ impl WorldCamera<'_> {
         Visibility { fraction, bounds_px: bounds, occluder }
     }
 
-    /// Renders neighbouring pixels of a row.
-    fn look(
+    /// Renders what the rays of a tile meet, into the group of each of its rows.
+    fn paint(
         &self,
-        tile: &[&SightedSolid<'_>],
+        tile: &mut Tile,
+        solids: &[&SightedSolid<'_>],
         eye: &Point3<f64>,
-        rays: &Vectors,
-        pixels: &mut [Hit],
+        rows: &mut [&mut HitGroup],
     ) {
-        let met = first(tile, rays);
-        let points = points(eye, rays, &met.t);
-        let mut left: [bool; LANES] =
-            std::array::from_fn(|lane| lane < pixels.len() && met.number[lane] != Met::NONE);
-        // All pixels of a solid together, which are most of the row.
-        while let Some(lane) = left.iter().position(|left| *left) {
-            let number = met.number[lane];
-            let wanted = std::array::from_fn(|lane| left[lane] && met.number[lane] == number);
-            self.shade(tile[number as usize], eye, (&points, rays, &met.t), &wanted, pixels);
-            left.iter_mut().zip(wanted).for_each(|(left, done)| *left &= !done);
+        for row in tile.mixed_rows() {
+            *rows[row] = HitGroup::NOTHING;
+        }
+        let TileParts { tile, shading, group } = tile.parts();
+        for same in tile.solids() {
+            let SightedSolid { shape, person, .. } = solids[same[0].solid as usize];
+            if self.world.has_shadows(self.lit) {
+                let [low, high] = tile.bounds_of(same);
+                self.world.find_shading(&low, &high, self.lit, shading);
+            }
+            for entry in same {
+                let batch = tile.batch(*entry);
+                let to = match batch.whole_row() {
+                    Some(row) => &mut *rows[row],
+                    None => &mut *group,
+                };
+                let surface = shape.surface(&batch.points, &batch.rays);
+                to.t = batch.t;
+                to.facing = surface.facing;
+                to.person = [*person; LANES];
+                let wanted = batch.wanted();
+                let of = &shape.material;
+                self.world.shine(of, &batch.points, &surface, &wanted, (shading, self.lit), to);
+                // Nearly all surfaces show themselves, without a look at normals and rays.
+                if !of.shows_itself() {
+                    for lane in 0..batch.count {
+                        let view = (eye, &batch.rays.at(lane));
+                        let normal = surface.normal.at(lane);
+                        to.set(lane, &self.world.beyond(to.at(lane), shape, &normal, view));
+                    }
+                }
+                if batch.whole_row().is_none() {
+                    for (lane, [row, column]) in batch.places().iter().enumerate() {
+                        rows[usize::from(*row)].set(usize::from(*column), &group.at(lane));
+                    }
+                }
+            }
         }
     }
-
-    /// Renders the `wanted` ones of some pixels, whose rays meet a solid at these points.
-    fn shade(
-        &self,
-        SightedSolid { shape, person, .. }: &SightedSolid<'_>,
-        eye: &Point3<f64>,
-        (points, rays, t): (&Vectors, &Vectors, &Lanes),
-        wanted: &[bool; LANES],
-        pixels: &mut [Hit],
-    ) {
-        let surface = shape.surface(points, rays);
-        let Shine { light, infrared } =
-            self.world.shine(&shape.material, points, &surface, wanted, self.lit);
-        // Nearly all surfaces show themselves, without a look at normals and rays.
-        let shows_itself = shape.material.shows_itself();
-        for (lane, pixel) in pixels.iter_mut().enumerate().filter(|(lane, _)| wanted[*lane]) {
-            let own = Hit {
-                t: t[lane],
-                light: [light[0][lane], light[1][lane], light[2][lane]],
-                infrared: infrared[lane],
-                facing: surface.facing[lane],
-                person: *person,
-            };
-            *pixel = if shows_itself {
-                own
-            } else {
-                let normal = surface.normal.at(lane);
-                self.world.beyond(own, shape, &normal, (eye, &rays.at(lane)))
-            };
-        }
-    }
-}
-
-/// The first solid that each ray of depth one meets, by its place among solids that are sorted.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn first(sights: &[&SightedSolid<'_>], rays: &Vectors) -> Met {
-    let mut met = Met::NOTHING;
-    for (number, sight) in (0..).zip(sights) {
-        if !met.reaches(sight.nearest) {
-            break;
-        }
-        sight.seen.shorten(rays, sight.nearest, number, &mut met);
-    }
-    met
 }
 
 /// One for each ray that meets some of these solids.
@@ -204,8 +201,12 @@ fn meet_any(solids: &[SolidView], rays: &Vectors) -> [u64; LANES] {
 /// Rays of depth one of a lens without distortion, in the axes that `turn` leads to, from a column
 /// on, some columns apart, of a row.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn straight_rays(lens: &Pinhole, turn: &Matrix3<f64>, [left, step, row]: [usize; 3]) -> Vectors {
-    let mut rays = Vectors::ZERO;
+fn straight_rays(
+    lens: &Pinhole,
+    turn: &Matrix3<f64>,
+    [left, step, row]: [usize; 3],
+    to: &mut Vectors,
+) {
     let left = left as f64;
     let step = step as f64;
     let y = (row as f64 - lens.cy) / lens.fy;
@@ -213,9 +214,8 @@ fn straight_rays(lens: &Pinhole, turn: &Matrix3<f64>, [left, step, row]: [usize;
         // Columns are whole numbers, so that this is exact.
         let column = left + step * lane as f64;
         let ray = Vector3::new((column - lens.cx) / lens.fx, y, 1.0);
-        rays.set(lane, &product(turn, &ray));
+        to.set(lane, &product(turn, &ray));
     }
-    rays
 }
 
 /// Where a camera stands and looks.
@@ -236,18 +236,16 @@ impl<'a> Eye<'a> {
         self.world_from_camera * self.camera.ray(Point2::new(column, row))
     }
 
-    /// Rays of a row, from this column on, `step` columns apart.
-    fn rays(&self, left: usize, step: usize, row: usize) -> Vectors {
+    /// Writes the rays of a row, from a column on, some columns apart.
+    fn rays(&self, [left, step, row]: [usize; 3], to: &mut Vectors) {
         match &self.camera.lens {
             Lens::Pinhole(lens) if lens.distortion == Distortion::None => {
-                straight_rays(lens, &self.world_from_camera, [left, step, row])
+                straight_rays(lens, &self.world_from_camera, [left, step, row], to);
             }
             _ => {
-                let mut rays = Vectors::ZERO;
                 for lane in 0..LANES {
-                    rays.set(lane, &self.ray((left + lane * step) as f64, row as f64));
+                    to.set(lane, &self.ray((left + lane * step) as f64, row as f64));
                 }
-                rays
             }
         }
     }
@@ -350,7 +348,7 @@ mod tests {
             let pose = Isometry3::rotation(Vector3::z() * yaw);
             let image = draw(&world, &camera, &pose, 2);
             let eye = Eye::new(&camera, &pose);
-            for (at, hit) in image.pixels().iter().enumerate() {
+            for (at, hit) in image.hits().iter().enumerate() {
                 let ray = eye.ray((at % 50) as f64, (at / 50) as f64);
                 prop_assert_eq!(*hit, world.first(world.solids(), &eye.at, &ray));
             }

@@ -4,15 +4,18 @@
 use std::ops::Range;
 use std::sync::LazyLock;
 
-use tagalong_core::{DepthImage, GreyImage, Image, RgbImage};
+use tagalong_core::{DepthImage, GreyImage, RgbImage};
 
+use crate::hits::{HitGroup, HitImage};
+use crate::lanes::LANES;
 use crate::material::luma;
 use crate::parallel::in_pieces;
 use crate::random::{normal_at, uniform_at};
-use crate::world::Hit;
 
 /// Mean brightness that the exposure aims at, 1 is white.
 const TARGET: f64 = 0.28;
+/// Of so many pixels one is sampled for the mean brightness.
+const SAMPLED: usize = 7;
 /// Rows that a thread works on at once.
 const STRIP_ROWS: usize = 16;
 /// Loss of light in the corners.
@@ -27,9 +30,13 @@ const SHOT_NOISE: f64 = 0.012;
 const LEAST_RETURN: f64 = 0.004;
 /// Steps per pixel of disparity (Khoshelham & Oude Elberink 2012).
 const STEPS_PER_PX: f64 = 8.0;
+/// Columns, and rows, that share a part of the noise of the matcher.
+const PATCH: usize = 4;
 /// Standard deviation of the place that a depth is taken from, pixels (Handa et
 /// al. 2014).
 const EDGE_JITTER_PX: f64 = 0.5;
+/// No reading is displaced by more pixels: [`normal_at`] returns no number above twice the root of 3.
+const REACH: usize = 2;
 
 /// The automatic exposure of a camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -57,29 +64,37 @@ impl Exposure {
     }
 
     /// A colour image.
-    pub fn colour(&mut self, seen: &Image<Hit>, moment: &Moment) -> RgbImage {
+    pub fn colour(&mut self, seen: &HitImage, moment: &Moment) -> RgbImage {
         let factor = self.adapt(seen);
         let film = Film::new(seen, moment, factor);
         let mut image = RgbImage::filled(seen.width(), seen.height(), [0; 3]);
-        film.expose(self.threads, image.pixels_mut(), |hit| hit.light, |pixel| pixel);
+        film.expose(self.threads, image.pixels_mut(), channel_light, colour_row);
         image
     }
 
     /// A grey image.
-    pub fn grey(&mut self, seen: &Image<Hit>, moment: &Moment) -> GreyImage {
+    pub fn grey(&mut self, seen: &HitImage, moment: &Moment) -> GreyImage {
         let factor = self.adapt(seen);
         let film = Film::new(seen, moment, factor);
         let mut image = GreyImage::filled(seen.width(), seen.height(), 0);
-        film.expose(self.threads, image.pixels_mut(), |hit| [luma(hit.light)], |[pixel]| pixel);
+        film.expose(self.threads, image.pixels_mut(), grey_light, grey_row);
         image
     }
 
     /// Adapts to the light within some images; returns the factor on light.
-    fn adapt(&mut self, seen: &Image<Hit>) -> f64 {
-        let pixels = seen.pixels();
-        // Every seventh pixel is enough for a mean, and coprime to usual widths.
-        let sampled = pixels.iter().step_by(7).map(|hit| luma(hit.light)).sum::<f64>();
-        let now = (sampled / pixels.len().div_ceil(7) as f64).max(1e-3);
+    fn adapt(&mut self, seen: &HitImage) -> f64 {
+        let width = seen.width();
+        let mut sum = 0.0;
+        for y in 0..seen.height() {
+            // Every seventh pixel is enough for a mean, and coprime to usual widths.
+            let first = (SAMPLED - y * width % SAMPLED) % SAMPLED;
+            for x in (first..width).step_by(SAMPLED) {
+                let (group, lane) = seen.group(x, y);
+                sum += luma(group.light.map(|channel| channel[lane]));
+            }
+        }
+        let count = (width * seen.height()).div_ceil(SAMPLED);
+        let now = (sum / count as f64).max(1e-3);
         // Part of the way only, because an automatic exposure is slow.
         let light = self.mean_light.map_or(now, |before| before + 0.2 * (now - before));
         self.mean_light = Some(light);
@@ -89,7 +104,7 @@ impl Exposure {
 
 /// Properties that the channels of an image share.
 struct Film<'a> {
-    seen: &'a Image<Hit>,
+    seen: &'a HitImage,
     moment: &'a Moment,
     /// Factor on light, so that 1 is white.
     factor: f64,
@@ -98,25 +113,26 @@ struct Film<'a> {
 }
 
 impl<'a> Film<'a> {
-    fn new(seen: &'a Image<Hit>, moment: &'a Moment, factor: f64) -> Self {
+    fn new(seen: &'a HitImage, moment: &'a Moment, factor: f64) -> Self {
         // Below the base light a camera raises its gain, and the noise with it.
         let gain = (TARGET / factor / BASE_LIGHT).recip().clamp(1.0, 16.0);
         let noise = [(READ_NOISE * gain).powi(2), SHOT_NOISE * SHOT_NOISE * gain];
         Self { seen, moment, factor, noise }
     }
 
-    /// All channels: lens blur, motion blur, vignetting, noise, gamma.
+    /// All channels: lens blur, motion blur, vignetting, noise, gamma. `light` writes the light of a
+    /// row and channel times a factor, `print` a row of pixels from the levels of its channels.
     fn expose<const CHANNELS: usize, P: Send>(
         &self,
         threads: usize,
         pixels: &mut [P],
-        light: impl Fn(&Hit) -> [f64; CHANNELS] + Sync,
-        pixel: impl Fn([u8; CHANNELS]) -> P + Sync,
+        light: impl Fn(&[HitGroup], usize, f64, &mut [f32]) + Sync,
+        print: impl Fn(&[Vec<u16>; CHANNELS], &mut [P]) + Sync,
     ) {
         let width = self.seen.width();
         in_pieces(pixels, STRIP_ROWS * width, threads, |number, strip| {
             let rows = number * STRIP_ROWS..number * STRIP_ROWS + strip.len() / width;
-            let across = self.blurred_across(&rows, &light);
+            let across: [Vec<f32>; CHANNELS] = self.blurred_across(&rows, &light);
             let mut levels = [(); CHANNELS].map(|()| vec![0; width]);
             let mut soft = vec![0.0; width];
             for (row, strip) in rows.clone().zip(strip.chunks_mut(width)) {
@@ -124,9 +140,7 @@ impl<'a> Film<'a> {
                     self.blur_along(row, rows.start, across, &mut soft);
                     self.develop(&soft, row, channel, levels);
                 }
-                for (x, to) in strip.iter_mut().enumerate() {
-                    *to = pixel(levels.each_ref().map(|levels| CURVE[usize::from(levels[x])]));
-                }
+                print(&levels, strip);
             }
         });
     }
@@ -135,22 +149,18 @@ impl<'a> Film<'a> {
     fn blurred_across<const CHANNELS: usize>(
         &self,
         rows: &Range<usize>,
-        light: impl Fn(&Hit) -> [f64; CHANNELS],
+        light: impl Fn(&[HitGroup], usize, f64, &mut [f32]),
     ) -> [Vec<f32>; CHANNELS] {
         let width = self.seen.width();
         let height = self.seen.height();
         let rows = rows.start.saturating_sub(1)..height.min(rows.end + 1);
         let mut across = [(); CHANNELS].map(|()| Vec::with_capacity(rows.len() * width));
-        let mut sharp = [(); CHANNELS].map(|()| vec![0.0; width]);
+        let mut sharp = vec![0.0; LANES * self.seen.row_groups()];
         let mut smeared = vec![0.0; width];
         for row in rows {
-            for (x, hit) in self.seen.row(row).iter().enumerate() {
-                for (sharp, light) in sharp.iter_mut().zip(light(hit)) {
-                    sharp[x] = (light * self.factor) as f32;
-                }
-            }
-            for (sharp, across) in sharp.iter().zip(&mut across) {
-                smear(sharp, self.moment.smear_px, &mut smeared);
+            for (channel, across) in across.iter_mut().enumerate() {
+                light(self.seen.row(row), channel, self.factor, &mut sharp);
+                smear(&sharp[..width], self.moment.smear_px, &mut smeared);
                 soften_across(&smeared, across);
             }
         }
@@ -207,6 +217,44 @@ static CURVE: LazyLock<[u8; 4096]> = LazyLock::new(|| {
     std::array::from_fn(|i| (255.0 * (i as f64 / 4095.0).powf(1.0 / 2.2)).round() as u8)
 });
 
+/// Writes the light of a row in one colour, times a factor, in groups of [`LANES`] pixels.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn channel_light(row: &[HitGroup], channel: usize, factor: f64, to: &mut [f32]) {
+    for (group, to) in row.iter().zip(to.chunks_exact_mut(LANES)) {
+        let light = &group.light[channel];
+        for lane in 0..LANES {
+            to[lane] = (light[lane] * factor) as f32;
+        }
+    }
+}
+
+/// As [`channel_light`], of the brightness of all colours together.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn grey_light(row: &[HitGroup], _: usize, factor: f64, to: &mut [f32]) {
+    for (group, to) in row.iter().zip(to.chunks_exact_mut(LANES)) {
+        let [red, green, blue] = &group.light;
+        for lane in 0..LANES {
+            to[lane] = (luma([red[lane], green[lane], blue[lane]]) * factor) as f32;
+        }
+    }
+}
+
+/// Writes a row of colours from the levels of their channels.
+fn colour_row([red, green, blue]: &[Vec<u16>; 3], to: &mut [[u8; 3]]) {
+    let curve: &[u8; 4096] = &CURVE;
+    for (((to, red), green), blue) in to.iter_mut().zip(red).zip(green).zip(blue) {
+        *to = [curve[usize::from(*red)], curve[usize::from(*green)], curve[usize::from(*blue)]];
+    }
+}
+
+/// Writes a row of grey values from their levels.
+fn grey_row([grey]: &[Vec<u16>; 1], to: &mut [u8]) {
+    let curve: &[u8; 4096] = &CURVE;
+    for (to, grey) in to.iter_mut().zip(grey) {
+        *to = curve[usize::from(*grey)];
+    }
+}
+
 /// The blur of a camera that turns: a running mean along a row.
 fn smear(row: &[f32], by_px: f64, to: &mut [f32]) {
     let reach = (0.5 * by_px.abs()).round() as usize;
@@ -214,9 +262,30 @@ fn smear(row: &[f32], by_px: f64, to: &mut [f32]) {
         to.copy_from_slice(row);
         return;
     }
-    for (x, to) in to.iter_mut().enumerate() {
+    let inner = reach.min(row.len())..row.len().saturating_sub(reach).max(reach.min(row.len()));
+    for x in (0..inner.start).chain(inner.end..row.len()) {
         let part = &row[x.saturating_sub(reach)..(x + reach + 1).min(row.len())];
-        *to = part.iter().sum::<f32>() / part.len() as f32;
+        to[x] = part.iter().sum::<f32>() / part.len() as f32;
+    }
+    // A narrow image has no column that is far enough from both borders.
+    if !inner.is_empty() {
+        running_mean(row, 2 * reach + 1, &mut to[inner]);
+    }
+}
+
+/// Means of so many numbers in a row, from each number on for which there are enough. Each is added
+/// up from its first number to its last, as a loop over one of them would do.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn running_mean(row: &[f32], of: usize, to: &mut [f32]) {
+    to.copy_from_slice(&row[..to.len()]);
+    for first in 1..of {
+        for (to, further) in to.iter_mut().zip(&row[first..]) {
+            *to += further;
+        }
+    }
+    let count = of as f32;
+    for to in to {
+        *to /= count;
     }
 }
 
@@ -250,19 +319,57 @@ pub struct DepthSensor {
 impl DepthSensor {
     /// The depth image; NaN where there is no reading: out of range, too little
     /// light returned, or in the shadow of the projector, which stands to the right.
-    pub fn measure(&self, seen: &Image<Hit>, seed: u64, threads: usize) -> DepthImage {
+    pub fn measure(&self, seen: &HitImage, seed: u64, threads: usize) -> DepthImage {
         let mut depth = DepthImage::filled(seen.width(), seen.height(), f32::NAN);
         let width = seen.width();
         in_pieces(depth.pixels_mut(), STRIP_ROWS * width, threads, |number, strip| {
             let mut row = DepthRow::new(width);
-            for (y, depth) in (number * STRIP_ROWS..).zip(strip.chunks_mut(width)) {
-                row.look(seen, seed, y);
+            let top = number * STRIP_ROWS;
+            let near = NearSurfaces::new(seen, top, strip.len() / width);
+            for (y, depth) in (top..).zip(strip.chunks_mut(width)) {
+                row.look(&near, seed, y);
                 row.measure(self, seed, y);
                 row.cast_shadows(self);
                 depth.copy_from_slice(&row.depth_m);
             }
         });
         depth
+    }
+}
+
+/// Surfaces of some rows of an image and of those around them, number by number.
+struct NearSurfaces {
+    /// Rows of the image.
+    height: usize,
+    /// The first row that is here.
+    top: usize,
+    /// Numbers of a row.
+    stride: usize,
+    t: Vec<f64>,
+    infrared: Vec<f64>,
+    facing: Vec<f64>,
+}
+
+impl NearSurfaces {
+    fn new(seen: &HitImage, top: usize, rows: usize) -> Self {
+        let first = top.saturating_sub(REACH);
+        let end = seen.height().min(top + rows + REACH);
+        let stride = LANES * seen.row_groups();
+        let count = stride * (end - first);
+        let mut near = Self {
+            height: seen.height(),
+            top: first,
+            stride,
+            t: Vec::with_capacity(count),
+            infrared: Vec::with_capacity(count),
+            facing: Vec::with_capacity(count),
+        };
+        for group in (first..end).flat_map(|y| seen.row(y)) {
+            near.t.extend_from_slice(&group.t);
+            near.infrared.extend_from_slice(&group.infrared);
+            near.facing.extend_from_slice(&group.facing);
+        }
+        near
     }
 }
 
@@ -274,6 +381,9 @@ struct DepthRow {
     t: Vec<f64>,
     infrared: Vec<f64>,
     facing: Vec<f64>,
+    /// Noise of the matcher in patches of [`PATCH`] pixels, and the same for each pixel.
+    patches: Vec<f64>,
+    coarse: Vec<f64>,
     depth_m: Vec<f32>,
 }
 
@@ -285,23 +395,30 @@ impl DepthRow {
             t: numbers(),
             infrared: numbers(),
             facing: numbers(),
+            patches: vec![0.0; width.div_ceil(PATCH)],
+            coarse: numbers(),
             depth_m: vec![f32::NAN; width],
         }
     }
 
     /// Takes the surfaces near each pixel: measured edges are displaced.
-    fn look(&mut self, seen: &Image<Hit>, seed: u64, y: usize) {
-        let first = (y * seen.width()) as u64;
+    fn look(&mut self, near: &NearSurfaces, seed: u64, y: usize) {
+        let width = self.t.len();
+        let first = (y * width) as u64;
         for (salt, off) in [0x54, 0x55].into_iter().zip(&mut self.off) {
             jitter(seed ^ salt, first, off);
         }
         let [columns, rows] = &self.off;
-        for (x, here) in seen.row(y).iter().enumerate() {
-            let column = x.wrapping_add_signed(columns[x] as isize);
-            let row = y.wrapping_add_signed(rows[x] as isize);
-            let inside = column < seen.width() && row < seen.height();
-            let hit = if inside { &seen.pixels()[row * seen.width() + column] } else { here };
-            (self.t[x], self.infrared[x], self.facing[x]) = (hit.t, hit.infrared, hit.facing);
+        let to = self.t.iter_mut().zip(&mut self.infrared).zip(&mut self.facing);
+        let off = columns.iter().zip(rows);
+        let own = (y - near.top) * near.stride;
+        for (x, (((t, infrared), facing), (columns, rows))) in to.zip(off).enumerate() {
+            let column = x.wrapping_add_signed(*columns as isize);
+            let row = y.wrapping_add_signed(*rows as isize);
+            let is_inside = (column < width) & (row < near.height);
+            let there = row.wrapping_sub(near.top).wrapping_mul(near.stride).wrapping_add(column);
+            let at = if is_inside { there } else { own.wrapping_add(x) };
+            (*t, *infrared, *facing) = (near.t[at], near.infrared[at], near.facing[at]);
         }
     }
 
@@ -343,6 +460,15 @@ fn measure(row: &mut DepthRow, sensor: &DepthSensor, seed: u64, y: u64) {
     let [nearest, farthest] = sensor.range_m;
     // Structured light measures disparities, so depth has steps that grow with its square.
     let steps = STEPS_PER_PX * sensor.focal_px * sensor.baseline_m;
+    let mut key = 0_u64;
+    for patch in &mut row.patches {
+        *patch = 0.5 + uniform_at(seed ^ 0x51, (y >> 2) << 20 | key);
+        key = key.wrapping_add(1);
+    }
+    for (coarse, patch) in row.coarse.chunks_mut(PATCH).zip(&row.patches) {
+        coarse.fill(*patch);
+    }
+    let coarse = &row.coarse[..width];
     let t = &row.t[..width];
     let infrared = &row.infrared[..width];
     let facing = &row.facing[..width];
@@ -352,7 +478,7 @@ fn measure(row: &mut DepthRow, sensor: &DepthSensor, seed: u64, y: u64) {
         let facing = if facing[x] > 0.0 { facing[x] } else { 0.0 };
         let light = infrared[x] * facing / (t * t);
         // The matcher decides for patches of 9 x 9 dots: holes have a size.
-        let coarse = 0.5 + uniform_at(seed ^ 0x51, (y >> 2) << 20 | x64 >> 2);
+        let coarse = coarse[x];
         let fine = 0.75 + 0.5 * uniform_at(seed ^ 0x52, y << 20 | x64);
         let returns = (t >= nearest) & (t <= farthest) & (light > LEAST_RETURN * coarse * fine);
         let disparity = steps / t + normal_at(seed ^ 0x53, first.wrapping_add(x64)) / 6.0;
@@ -364,7 +490,10 @@ fn measure(row: &mut DepthRow, sensor: &DepthSensor, seed: u64, y: u64) {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
+    use crate::world::Hit;
 
     const SENSOR: DepthSensor =
         DepthSensor { focal_px: 580.0, baseline_m: 0.075, range_m: [0.5, 8.0] };
@@ -374,7 +503,7 @@ mod tests {
     }
 
     fn spread(z: f64) -> (f64, f64) {
-        let seen = Image::filled(200, 50, wall(z, 0.6));
+        let seen = HitImage::from_fn(200, 50, |_, _| wall(z, 0.6));
         let depth = SENSOR.measure(&seen, 9, 2);
         let read: Vec<f64> =
             depth.pixels().iter().filter(|d| !d.is_nan()).map(|d| f64::from(*d)).collect();
@@ -396,7 +525,7 @@ mod tests {
     #[test]
     fn near_far_and_black_things_are_not_seen() {
         fn holes(hit: Hit) -> usize {
-            let depth = SENSOR.measure(&Image::filled(40, 40, hit), 3, 2);
+            let depth = SENSOR.measure(&HitImage::from_fn(40, 40, |_, _| hit), 3, 2);
             depth.pixels().iter().filter(|d| d.is_nan()).count()
         }
 
@@ -407,7 +536,7 @@ mod tests {
 
     #[test]
     fn the_projector_throws_a_shadow_beside_what_is_near() {
-        let seen = Image::from_fn(200, 4, |x, _| wall(if x > 100 { 1.0 } else { 3.0 }, 0.6));
+        let seen = HitImage::from_fn(200, 4, |x, _| wall(if x > 100 { 1.0 } else { 3.0 }, 0.6));
         let depth = SENSOR.measure(&seen, 3, 1);
         let holes = depth.row(1).iter().filter(|d| d.is_nan()).count() as f64;
         let expected = 580.0 * 0.075 * (1.0 - 1.0 / 3.0);
@@ -418,7 +547,8 @@ mod tests {
     fn exposure_brings_light_and_dark_rooms_to_one_brightness() {
         let moment = Moment { seed: 1, smear_px: 0.0, gain: 1.0 };
         let mean_and_noise = |light: f64| {
-            let seen = Image::filled(64, 64, Hit { light: [light; 3], ..wall(2.0, 0.5) });
+            let hit = Hit { light: [light; 3], ..wall(2.0, 0.5) };
+            let seen = HitImage::from_fn(64, 64, |_, _| hit);
             let grey = Exposure::default().grey(&seen, &moment);
             let row = &grey.row(32)[24..40];
             let mean = row.iter().map(|v| f64::from(*v)).sum::<f64>() / 16.0;
@@ -427,5 +557,129 @@ mod tests {
         let ((bright, little), (dark, much)) = (mean_and_noise(300.0), mean_and_noise(6.0));
         assert!((bright - dark).abs() < 12.0, "{bright} {dark}");
         assert!(much > 2.0 * little, "{little} {much}");
+    }
+
+    /// Surfaces that differ from pixel to pixel.
+    fn mixed(width: usize, height: usize, seed: u64) -> HitImage {
+        HitImage::from_fn(width, height, |x, y| {
+            let part = |salt: u64| uniform_at(seed ^ salt, (y * width + x) as u64);
+            Hit {
+                t: 2.0 + (y % 8) as f64 + 0.1 * part(1) - if part(7) < 0.02 { 1.7 } else { 0.0 },
+                light: [300.0 * part(2), 90.0 * part(3), 60.0 * part(4)],
+                infrared: part(5),
+                facing: part(6) - 0.1,
+                person: None,
+            }
+        })
+    }
+
+    /// Light of a row after the blur of a turn and one half of that of a lens.
+    fn slow_row(seen: &HitImage, y: usize, factor: f64, reach: usize) -> Vec<f32> {
+        let row = (0..seen.width() as i64).map(|x| seen.get(x, y as i64).unwrap());
+        let row: Vec<f32> = row.map(|hit| (luma(hit.light) * factor) as f32).collect();
+        let last = row.len() - 1;
+        let mean = |x: usize| {
+            let part = &row[x.saturating_sub(reach)..=(x + reach).min(last)];
+            part.iter().sum::<f32>() / part.len() as f32
+        };
+        let smeared: Vec<f32> = (0..row.len()).map(mean).collect();
+        let soft = |x: usize| match x {
+            0 => smeared[0],
+            x if x == last => smeared[last],
+            x => 0.25 * (smeared[x - 1] + 2.0 * smeared[x] + smeared[x + 1]),
+        };
+        (0..row.len()).map(soft).collect()
+    }
+
+    /// A grey image, pixel by pixel.
+    fn slow_grey(seen: &HitImage, moment: &Moment) -> Vec<u8> {
+        let (width, height) = (seen.width(), seen.height());
+        let sampled: Vec<f64> = seen.hits().iter().step_by(7).map(|hit| luma(hit.light)).collect();
+        let factor = TARGET / (sampled.iter().sum::<f64>() / sampled.len() as f64);
+        let film = Film::new(seen, moment, factor);
+        let reach = (0.5 * moment.smear_px.abs()).round() as usize;
+        let rows: Vec<_> = (0..height).map(|y| slow_row(seen, y, factor, reach)).collect();
+        let mut grey = Vec::new();
+        for y in 0..height {
+            for x in 0..width {
+                let is_border = y == 0 || y + 1 == height;
+                let light = if is_border {
+                    rows[y][x]
+                } else {
+                    0.25 * (rows[y - 1][x] + 2.0 * rows[y][x] + rows[y + 1][x])
+                };
+                let (cx, cy) = (0.5 * width as f32, 0.5 * height as f32);
+                let (dx, dy) = (x as f32 - cx, y as f32 - cy);
+                let corner = VIGNETTING * (dx * dx + dy * dy) / (cx * cx + cy * cy);
+                let dimmed = f64::from(light * (1.0 - corner)) * moment.gain;
+                let sigma = (film.noise[0] + film.noise[1] * dimmed).sqrt();
+                let noisy = dimmed + sigma * normal_at(moment.seed, (y * width + x) as u64);
+                grey.push(CURVE[(noisy.clamp(0.0, 1.0) * 4095.0) as usize]);
+            }
+        }
+        grey
+    }
+
+    /// A depth image, pixel by pixel.
+    fn slow_depth(seen: &HitImage, seed: u64) -> Vec<f32> {
+        let mut depth = Vec::new();
+        for y in 0..seen.height() as u64 {
+            let mut lit_from = Vec::new();
+            let mut row = Vec::new();
+            for x in 0..seen.width() as u64 {
+                let key = y * seen.width() as u64 + x;
+                let off = |salt| (EDGE_JITTER_PX * normal_at(seed ^ salt, key)).round() as i64;
+                let there = seen.get(x as i64 + off(0x54), y as i64 + off(0x55));
+                let hit = there.unwrap_or_else(|| seen.get(x as i64, y as i64).unwrap());
+                let light = hit.infrared * hit.facing.max(0.0) / (hit.t * hit.t);
+                let coarse = 0.5 + uniform_at(seed ^ 0x51, ((y / 4) << 20) | (x / 4));
+                let fine = 0.75 + 0.5 * uniform_at(seed ^ 0x52, y << 20 | x);
+                let steps = STEPS_PER_PX * SENSOR.focal_px * SENSOR.baseline_m;
+                let disparity = (steps / hit.t + normal_at(seed ^ 0x53, key) / 6.0).round();
+                let returns = (0.5..=8.0).contains(&hit.t) && light > LEAST_RETURN * coarse * fine;
+                row.push(if returns { (steps / disparity.max(1.0)) as f32 } else { f32::NAN });
+                lit_from.push(x as f64 - SENSOR.focal_px * SENSOR.baseline_m / hit.t);
+            }
+            for (x, metres) in row.into_iter().enumerate() {
+                let is_shadowed = lit_from[x + 1..].iter().any(|other| lit_from[x] > other + 1.0);
+                depth.push(if is_shadowed { f32::NAN } else { metres });
+            }
+        }
+        depth
+    }
+
+    proptest! {
+        #[test]
+        fn images_are_those_of_a_loop_over_pixels(
+            width in 3..90usize, height in 3..40usize, seed in 0..1000u64, smear_px in -30.0..30.0f64,
+        ) {
+            let seen = mixed(width, height, seed);
+            let moment = Moment { seed, smear_px, gain: 1.03 };
+            let grey = Exposure::new(2).grey(&seen, &moment);
+            prop_assert_eq!(grey.pixels(), slow_grey(&seen, &moment));
+            // Colours are grey images of one channel each, but for the seeds of their noise.
+            let same = HitImage::from_fn(width, height, |x, y| {
+                let hit = seen.get(x as i64, y as i64).unwrap();
+                Hit { light: [luma(hit.light); 3], ..hit }
+            });
+            let colour = Exposure::new(2).colour(&same, &moment);
+            let red: Vec<u8> = colour.pixels().iter().map(|pixel| pixel[0]).collect();
+            prop_assert_eq!(red, slow_grey(&same, &moment));
+        }
+
+        #[test]
+        fn depths_are_those_of_a_loop_over_pixels(
+            width in 1..90usize, height in 1..40usize, seed in 0..1000u64,
+        ) {
+            let seen = mixed(width, height, seed);
+            let depth = SENSOR.measure(&seen, seed, 2);
+            let slow = slow_depth(&seen, seed);
+            let mut readings = 0;
+            for (depth, slow) in depth.pixels().iter().zip(slow) {
+                prop_assert!(*depth == slow || depth.is_nan() && slow.is_nan(), "{depth} {slow}");
+                readings += usize::from(!depth.is_nan());
+            }
+            prop_assert!(readings > 0 || width * height < 400);
+        }
     }
 }

@@ -3,7 +3,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::lanes::{LANES, Vectors};
+use crate::lanes::{LANES, Lanes, Vectors, dot};
 use crate::seen::SolidView;
 use crate::shape::Shape;
 use crate::sight::{before, between};
@@ -13,6 +13,11 @@ use crate::sight::{before, between};
 pub const COARSE: usize = 16;
 /// See [`COARSE`].
 pub const FINE: usize = 2 * COARSE;
+/// A bundle of ways through more cells is held against each solid instead.
+const MOST_CELLS: usize = 64;
+/// Room for rounding, m, and on a face, whose half side is 1.
+const SLACK_M: f64 = 1e-4;
+const SLACK: f64 = 1e-6;
 
 /// Objects around a lamp that cast shadows.
 #[derive(Clone, Debug, Default)]
@@ -20,6 +25,8 @@ pub struct Shadows {
     /// Cells along the side of a face.
     side: usize,
     solids: Vec<SolidView>,
+    /// Balls around them: the middle as seen from the lamp, and the radius, m.
+    balls: Vec<(Vector3<f64>, f64)>,
     /// Numbers of solids, cell by cell.
     numbers: Vec<u32>,
     /// Six faces of rows of cells: where the numbers of each cell end.
@@ -34,7 +41,9 @@ impl Shadows {
         solids: impl Iterator<Item = (Option<u16>, &'a Shape)> + Clone,
     ) -> Self {
         let seen = solids.clone().map(|(_, solid)| solid.seen_from(&lamp)).collect();
-        let mut shadows = Self { side, solids: seen, ..Self::default() };
+        let bounds = solids.clone().map(|(_, solid)| solid.bound());
+        let balls = bounds.map(|(centre, radius)| (centre - lamp, radius)).collect();
+        let mut shadows = Self { side, solids: seen, balls, ..Self::default() };
         for face in 0..6 {
             let sights = before(solids.clone(), &lamp, &on_face(face, 0.0, 0.0));
             let line = |number| line(number, side);
@@ -61,23 +70,45 @@ impl Shadows {
         numbers.any(|n| self.solids[*n as usize].meet(way).is_some_and(|t| t < 1.0))
     }
 
-    /// Closes the `open` ways from the lamp in which something stands; `cells` are those that the ways
-    /// go through.
-    pub fn darken(&self, ways: &Vectors, cells: &[i32; LANES], open: &mut [bool; LANES]) {
-        let mut left = bits(open);
-        let mut dark = 0;
-        while left != 0 {
-            let cell = cells[left.trailing_zeros() as usize];
-            let together = left & bits(&cells.map(|other| other == cell));
-            let numbers = self.within(cell as usize);
-            if !numbers.is_empty() {
-                dark |= together & barred(&self.solids, numbers, ways, together);
+    /// Writes the numbers of all solids that may stand in some way of a bundle, and perhaps of some
+    /// others, to `found`.
+    pub fn find(&self, bundle: &Bundle, found: &mut Vec<u32>) {
+        found.clear();
+        match self.cells(bundle) {
+            Some((face, [left, right], [top, bottom])) => {
+                for row in top..=bottom {
+                    for column in left..=right {
+                        let cell = (face * self.side + row) * self.side + column;
+                        found.extend_from_slice(self.within(cell));
+                    }
+                }
+                found.sort_unstable();
+                found.dedup();
             }
-            left &= !together;
+            None => found.extend(0..self.solids.len() as u32),
         }
-        for (lane, open) in open.iter_mut().enumerate() {
-            *open &= dark >> lane & 1 == 0;
+        found.retain(|number| bundle.reaches(&self.balls[*number as usize]));
+    }
+
+    /// Returns the face that a bundle goes through, the columns and the rows of cells there, from the
+    /// first to the last; `None` for one through several faces or many cells.
+    fn cells(&self, bundle: &Bundle) -> Option<(usize, [usize; 2], [usize; 2])> {
+        let main = bundle.main_axis()?;
+        let columns = bundle.cells_along((main + 1) % 3, main, self.side);
+        let rows = bundle.cells_along((main + 2) % 3, main, self.side);
+        let count = (columns[1] - columns[0] + 1) * (rows[1] - rows[0] + 1);
+        let face = 2 * main + usize::from(bundle.high[main] < 0.0);
+        (count <= MOST_CELLS).then_some((face, columns, rows))
+    }
+
+    /// Returns the ways of interest, as bits, in which some of the numbered solids stand; they are
+    /// those of [`Shadows::find`] for a bundle of these ways.
+    pub fn bar(&self, numbers: &[u32], ways: &Vectors, interest: u32) -> u32 {
+        if numbers.is_empty() || interest == 0 {
+            return 0;
         }
+        let (low, high) = bounds(ways, interest);
+        barred(self, numbers, &Bundle::new(low, high), ways, interest) & interest
     }
 
     /// The numbers of the solids in a cell.
@@ -87,21 +118,143 @@ impl Shadows {
     }
 }
 
-/// Returns a bit for each lane.
-#[inline(always)]
-fn bits(of: &[bool; LANES]) -> u32 {
-    of.iter().rev().fold(0, |bits, bit| bits << 1 | u32::from(*bit))
+/// Ways from a lamp whose ends lie in a box.
+#[derive(Clone, Copy, Debug)]
+pub struct Bundle {
+    low: Vector3<f64>,
+    high: Vector3<f64>,
+    /// The way to the middle of the box, and one over its squared length.
+    middle: Vector3<f64>,
+    per_square: f64,
+    /// No way is farther from the middle one at any part of its length, m.
+    radius: f64,
 }
 
-/// Returns the ways in which some of the numbered solids stand, until none of those of interest
-/// is left; both as bits.
+impl Bundle {
+    /// Creates the bundle of all ways to a box, given by two of its corners as seen from the lamp.
+    pub fn new(low: Vector3<f64>, high: Vector3<f64>) -> Self {
+        let middle = 0.5 * (low + high);
+        // A lamp in the box has a middle way without length.
+        let per_square = middle.norm_squared().max(SLACK_M * SLACK_M).recip();
+        let radius = 0.5 * (high - low).norm() + SLACK_M;
+        Self { low, high, middle, per_square, radius }
+    }
+
+    /// Returns the axis whose face of the cube all ways go through; `None` if there are several.
+    fn main_axis(&self) -> Option<usize> {
+        (0..3).find(|axis| {
+            let others = self.far_m((axis + 1) % 3).max(self.far_m((axis + 2) % 3));
+            self.near_m(*axis) > others
+        })
+    }
+
+    /// Returns the first and the last of the cells that the ways go through, along an axis of the face
+    /// of a main axis.
+    fn cells_along(&self, axis: usize, main: usize, side: usize) -> [usize; 2] {
+        let half = 0.5 * side as f64;
+        // What is nearer along the main axis lies farther out on the face.
+        let near_m = self.near_m(main);
+        let far_m = self.far_m(main);
+        let from = self.low[axis] / if self.low[axis] < 0.0 { near_m } else { far_m };
+        let to = self.high[axis] / if self.high[axis] > 0.0 { near_m } else { far_m };
+        [from - SLACK, to + SLACK].map(|at| ((at * half + half).max(0.0) as usize).min(side - 1))
+    }
+
+    /// Returns the largest distance of an end from the lamp along an axis, m.
+    fn far_m(&self, axis: usize) -> f64 {
+        self.low[axis].abs().max(self.high[axis].abs())
+    }
+
+    /// Returns the least distance of an end from the lamp along an axis, m; not positive if there are
+    /// ends on both sides.
+    fn near_m(&self, axis: usize) -> f64 {
+        self.low[axis].max(-self.high[axis])
+    }
+
+    /// Returns false if a ball is beside all ways.
+    fn reaches(&self, (centre, radius): &(Vector3<f64>, f64)) -> bool {
+        let part = (dot(centre, &self.middle) * self.per_square).clamp(0.0, 1.0);
+        let away = centre - self.middle * part;
+        let reach = radius + self.radius;
+        dot(&away, &away) <= reach * reach
+    }
+}
+
+/// Returns the lowest and highest coordinates of some vectors, those of lanes whose bits are set; at
+/// least one must be.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn barred(solids: &[SolidView], numbers: &[u32], ways: &Vectors, interest: u32) -> u32 {
+pub fn bounds(of: &Vectors, wanted: u32) -> (Vector3<f64>, Vector3<f64>) {
+    // Lanes that do not count repeat one that does.
+    let one = of.at(wanted.trailing_zeros() as usize % LANES);
+    let (low_x, high_x) = range(&of.x, wanted, one.x);
+    let (low_y, high_y) = range(&of.y, wanted, one.y);
+    let (low_z, high_z) = range(&of.z, wanted, one.z);
+    (Vector3::new(low_x, low_y, low_z), Vector3::new(high_x, high_y, high_z))
+}
+
+/// Returns the least and the largest of some numbers. Halves are compared side by side, since a loop
+/// over all is no vector instruction.
+#[inline(always)]
+fn range(of: &Lanes, wanted: u32, one: f64) -> (f64, f64) {
+    const HALF: usize = LANES / 2;
+    const QUARTER: usize = LANES / 4;
+    let mut counted = [0.0; LANES];
+    for lane in 0..LANES {
+        counted[lane] = if wanted >> lane & 1 == 1 { of[lane] } else { one };
+    }
+    let mut low = [0.0; HALF];
+    let mut high = [0.0; HALF];
+    for lane in 0..HALF {
+        low[lane] = less(counted[lane], counted[lane + HALF]);
+        high[lane] = -less(-counted[lane], -counted[lane + HALF]);
+    }
+    for lane in 0..QUARTER {
+        low[lane] = less(low[lane], low[lane + QUARTER]);
+        high[lane] = -less(-high[lane], -high[lane + QUARTER]);
+    }
+    let mut least = low[0];
+    let mut most = high[0];
+    for lane in 1..QUARTER {
+        least = less(least, low[lane]);
+        most = -less(-most, -high[lane]);
+    }
+    (least, most)
+}
+
+#[inline(always)]
+fn less(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// Returns a bit for each lane.
+#[inline(always)]
+pub fn bits(of: &[bool; LANES]) -> u32 {
+    let mut bits = 0;
+    for lane in 0..LANES {
+        bits |= u32::from(of[lane]) << lane;
+    }
+    bits
+}
+
+/// Returns the ways in which some of the numbered solids stand, until none of those of interest,
+/// which a bundle holds, is left; both as bits.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn barred(
+    shadows: &Shadows,
+    numbers: &[u32],
+    bundle: &Bundle,
+    ways: &Vectors,
+    interest: u32,
+) -> u32 {
     // As wide as the rays' numbers, because vector instructions convert slowly between widths.
     let interest: [u64; LANES] = std::array::from_fn(|lane| u64::from(interest >> lane & 1));
     let mut barred = [0; LANES];
     for number in numbers {
-        solids[*number as usize].bar(ways, 1.0, &mut barred);
+        // The ball around a solid is a cheap question to ask first.
+        if !bundle.reaches(&shadows.balls[*number as usize]) {
+            continue;
+        }
+        shadows.solids[*number as usize].bar(ways, 1.0, &mut barred);
         let mut open = 0;
         for lane in 0..LANES {
             open |= interest[lane] & !barred[lane];
@@ -111,33 +264,6 @@ fn barred(solids: &[SolidView], numbers: &[u32], ways: &Vectors, interest: u32) 
         }
     }
     bits(&barred.map(|barred| barred != 0))
-}
-
-/// Returns the cells that some ways go through, of faces with `side` cells along a side.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub fn cells(ways: &Vectors, side: usize) -> [i32; LANES] {
-    let mut cells = [0; LANES];
-    for lane in 0..LANES {
-        cells[lane] = cell(&ways.at(lane), side);
-    }
-    cells
-}
-
-/// Returns the coarse cells in which [`FINE`] cells lie. Twice as many cells along a side are exactly
-/// half as large, so that these are the ones that [`cells`] returns, without its divisions.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub fn coarse_cells(fine: &[i32; LANES]) -> [i32; LANES] {
-    // Sides are powers of two: column, row and face are digits of the number of a cell.
-    const BITS: u32 = FINE.trailing_zeros();
-    const DIGIT: i32 = FINE as i32 - 1;
-    let mut coarse = [0; LANES];
-    for lane in 0..LANES {
-        let column = (fine[lane] & DIGIT) >> 1;
-        let row = ((fine[lane] >> BITS) & DIGIT) >> 1;
-        let face = fine[lane] >> (2 * BITS);
-        coarse[lane] = face << (2 * BITS - 2) | row << (BITS - 1) | column;
-    }
-    coarse
 }
 
 /// Where a line between cells runs on a face, -1 to 1.
@@ -156,8 +282,7 @@ fn on_face(face: usize, u: f64, v: f64) -> Vector3<f64> {
     point
 }
 
-/// The cell that a way goes through. Without branches, for loops over lanes.
-#[inline(always)]
+/// The cell that a way goes through.
 fn cell(way: &Vector3<f64>, side: usize) -> i32 {
     let x = way.x.abs();
     let y = way.y.abs();
@@ -209,33 +334,12 @@ mod tests {
     }
 
     proptest! {
-        #[test]
-        fn coarse_cells_are_those_of_a_coarse_cube(
-            ways in prop::collection::vec(prop::array::uniform3(-4.0..4.0f64), LANES),
-            flat in 0..4usize,
-        ) {
-            let mut side_by_side = Vectors::ZERO;
-            for (lane, way) in ways.into_iter().enumerate() {
-                let mut way = Vector3::from(way);
-                // Ways along an axis lie on the border of cells.
-                if let Some(part) = way.get_mut(flat).filter(|_| lane % 2 == 0) {
-                    *part = 0.0;
-                }
-                side_by_side.set(lane, &way);
-            }
-            let fine = cells(&side_by_side, FINE);
-            prop_assert_eq!(coarse_cells(&fine), cells(&side_by_side, COARSE));
-        }
-
-    }
-
-    proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
         #[test]
         fn shadows_are_where_the_way_to_the_lamp_is_barred(
             solids in solids(),
-            points in prop::collection::vec(prop::array::uniform3(-4.0..4.0f64), 200),
-            side in 1..40usize,
+            points in prop::collection::vec(prop::array::uniform3(-4.0..4.0f64), 192),
+            side in 1..40usize, size_m in 0.0..0.5f64,
         ) {
             let lamp = Point3::new(0.3, -0.2, 0.5);
             let shadows = Shadows::new(side, lamp, solids.iter().map(|solid| (None, solid)));
@@ -243,17 +347,65 @@ mod tests {
             let barred = |way: &Vector3<f64>| {
                 solids.iter().any(|s| s.meet(&lamp, way).is_some_and(|t| t < 1.0))
             };
-            for ways in ways.chunks_exact(LANES) {
-                let mut side_by_side = Vectors::ZERO;
-                (0..).zip(ways).for_each(|(lane, way)| side_by_side.set(lane, way));
-                // Closed ways stay closed.
-                let mut open: [bool; LANES] = std::array::from_fn(|lane| lane % 5 != 4);
-                shadows.darken(&side_by_side, &cells(&side_by_side, side), &mut open);
-                for (lane, (way, open)) in ways.iter().zip(open).enumerate() {
-                    prop_assert_eq!(shadows.on(way), barred(way));
-                    prop_assert_eq!(open, lane % 5 != 4 && !barred(way));
+            for way in &ways {
+                prop_assert_eq!(shadows.on(way), barred(way));
+            }
+            // Ways in all directions, and to a patch like those behind a tile of an image.
+            let size_m = size_m * size_m;
+            let near = |way: &Vector3<f64>| ways[0] + size_m * way;
+            let patch: Vec<_> = ways.iter().map(near).collect();
+            let mut found = Vec::new();
+            for ways in [ways, patch] {
+                let mut low = Vector3::repeat(f64::INFINITY);
+                let mut high = -low;
+                for way in &ways {
+                    low = low.inf(way);
+                    high = high.sup(way);
+                }
+                shadows.find(&Bundle::new(low, high), &mut found);
+                for ways in ways.chunks_exact(LANES) {
+                    let mut side_by_side = Vectors::ZERO;
+                    (0..).zip(ways).for_each(|(lane, way)| side_by_side.set(lane, way));
+                    let expected: [bool; LANES] =
+                        std::array::from_fn(|lane| lane % 5 != 4 && barred(&ways[lane]));
+                    let interest = bits(&std::array::from_fn(|lane| lane % 5 != 4));
+                    let met = shadows.bar(&found, &side_by_side, interest);
+                    prop_assert_eq!(met, bits(&expected));
                 }
             }
         }
+
+        #[test]
+        fn bounds_are_those_of_the_lanes_that_count(
+            at in prop::collection::vec(prop::array::uniform3(-4.0..4.0f64), LANES),
+            wanted in 1..1u32 << LANES,
+        ) {
+            let mut vectors = Vectors::ZERO;
+            let mut low = Vector3::repeat(f64::INFINITY);
+            let mut high = -low;
+            for (lane, at) in at.into_iter().enumerate() {
+                let at = Vector3::from(at);
+                vectors.set(lane, &at);
+                if wanted >> lane & 1 == 1 {
+                    low = low.inf(&at);
+                    high = high.sup(&at);
+                }
+            }
+            prop_assert_eq!(bounds(&vectors, wanted), (low, high));
+        }
+    }
+
+    #[test]
+    fn a_patch_of_a_wall_looks_at_the_solids_before_it_alone() {
+        let at = |y: f64| solid((0, [2.0, y, 0.0], [0.0; 3]));
+        let solids = [at(-2.0), at(0.0), at(2.0), solid((0, [5.0, 0.0, 0.0], [0.0; 3]))];
+        let lamp = Point3::origin();
+        let shadows = Shadows::new(FINE, lamp, solids.iter().map(|solid| (None, solid)));
+        let patch = Bundle::new(Vector3::new(4.0, -0.1, -0.1), Vector3::new(4.0, 0.1, 0.1));
+        let mut found = vec![7];
+        shadows.find(&patch, &mut found);
+        assert_eq!(found, [1], "what stands behind the patch does not count, either");
+        let (face, columns, rows) = shadows.cells(&patch).unwrap();
+        assert_eq!((face, columns, rows), (0, [15, 16], [15, 16]));
     }
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::{
     Isometry2, Isometry3, Point2, Point3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3,
 };
-use tagalong_core::{Image, Images, RgbImage, RightImage, WheelSpeeds};
+use tagalong_core::{Images, RgbImage, RightImage, WheelSpeeds};
 use tagalong_geometry::{Camera, Distortion, Panorama, Pinhole, Rect};
 
 use crate::approach::Approacher;
@@ -16,6 +16,7 @@ use crate::camera_settings::CameraKind;
 use crate::crowd::Blocks;
 use crate::faults::ScheduledFault;
 use crate::furniture::{Furniture, FurnitureKind};
+use crate::hits::HitImage;
 use crate::laser::LaserSettings;
 use crate::lidar::LidarSettings;
 use crate::mirror::MirrorCamera;
@@ -30,7 +31,7 @@ use crate::scene::Scene;
 use crate::sensor::{DepthSensor, Exposure, Moment};
 use crate::shape::Shape;
 use crate::webcam::Webcam;
-use crate::world::{Hit, Object, Stage, World};
+use crate::world::{Object, Stage, World};
 
 mod crowd;
 mod in_sight;
@@ -213,6 +214,8 @@ pub struct Simulation {
     approacher: Option<Approacher>,
     robot: Robot,
     exposures: [Exposure; 2],
+    /// Images of lenses that are drawn over again: new memory costs as much as some of the drawing.
+    canvases: Vec<HitImage>,
     chance: Random,
     now_ns: u64,
     shots: u64,
@@ -266,6 +269,7 @@ impl Simulation {
             blocks: crowd::blocks(scene),
             robot: Robot::new(&scene.robot, stream(4)),
             exposures: [Exposure::new(threads); 2],
+            canvases: Vec::new(),
             chance: stream(5),
             now_ns: 0,
             shots: 0,
@@ -421,13 +425,19 @@ impl Simulation {
         let pose = self.world_from_robot(0.5);
         let (seen, truth) = match &self.mirror {
             Some(mirror) => self.in_mirror(mirror, &world, &uppers, &pose),
-            None => self.in_lens(&world, &uppers, &pose),
+            None => {
+                let canvas = self.canvas();
+                self.in_lens(canvas, &world, &uppers, &pose)
+            }
         };
         let images = match self.scene.camera.kind {
             CameraKind::Rgbd => self.rgbd(&seen),
             CameraKind::Stereo => self.stereo(&world, &seen),
             CameraKind::Panorama => self.circle(&seen),
         };
+        if self.mirror.is_none() {
+            self.canvases.push(seen);
+        }
         let laser =
             self.laser().map(|laser| laser.measure(&world, &pose, self.moment(0, 1.0).seed));
         let lidar = self
@@ -500,8 +510,14 @@ impl Simulation {
         Moment { seed, smear_px: turned * self.camera.focal_px(), gain }
     }
 
+    /// Returns an image to draw over.
+    fn canvas(&mut self) -> HitImage {
+        let Camera { width, height, .. } = self.true_camera;
+        self.canvases.pop().unwrap_or_else(|| HitImage::nothing(width, height))
+    }
+
     /// Returns the image of the depth camera, if it is taken later than that of the colour camera.
-    fn seen_later(&mut self) -> Option<Image<Hit>> {
+    fn seen_later(&mut self) -> Option<HitImage> {
         let offset_s = self.scene.camera.depth_offset_s;
         if offset_s == 0.0 {
             return None;
@@ -513,16 +529,17 @@ impl Simulation {
         self.robot.step(now_s, offset_s);
         self.walk(now_s, offset_s);
         let (world, _) = self.world();
+        let mut seen = self.canvas();
         let pose = |part| self.world_from_robot(part);
         let camera = &self.true_camera;
-        let seen =
-            WorldCamera { world: &world, camera, pose: &pose, lit: false }.draw(self.threads);
+        let view = WorldCamera { world: &world, camera, pose: &pose, lit: false };
+        view.draw_over(&mut seen, self.threads);
         (self.robot, self.walkers) = (robot, walkers);
         self.approacher = approacher;
         Some(seen)
     }
 
-    fn rgbd(&mut self, seen: &Image<Hit>) -> Images {
+    fn rgbd(&mut self, seen: &HitImage) -> Images {
         let later = self.seen_later();
         let settings = &self.scene.camera;
         let sensor = DepthSensor {
@@ -537,45 +554,49 @@ impl Simulation {
             self.threads,
         )));
         let lit = settings.colour;
+        self.canvases.extend(later);
         let colour = lit.then(|| Arc::new(self.exposures[0].colour(seen, &moment)));
         Images { colour, depth, ..Images::default() }
     }
 
     /// A turn of the robot smears the circle along itself, which is not drawn.
-    fn circle(&mut self, seen: &Image<Hit>) -> Images {
+    fn circle(&mut self, seen: &HitImage) -> Images {
         // A turn smears along circles, which the blur along rows cannot show.
         let moment = Moment { smear_px: 0.0, ..self.moment(0, 1.0) };
         let colour = self.exposures[0].colour(seen, &moment);
         Images { colour: Some(Arc::new(colour)), ..Images::default() }
     }
 
-    fn stereo(&mut self, world: &World, left: &Image<Hit>) -> Images {
+    fn stereo(&mut self, world: &World, left: &HitImage) -> Images {
         let mut camera = self.true_camera.clone();
         // A fifth of a pixel is the error that rectification usually leaves.
         let tilt = 0.2 / camera.focal_px();
         let aside = Translation3::new(self.scene.camera.baseline_m, 0.0, 0.0);
         let tilt = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), tilt);
         camera.robot_from_camera *= Isometry3::from_parts(aside, tilt);
+        let mut right = self.canvas();
         let pose = |part| self.world_from_robot(part);
-        let right =
-            WorldCamera { world, camera: &camera, pose: &pose, lit: true }.draw(self.threads);
+        let view = WorldCamera { world, camera: &camera, pose: &pose, lit: true };
+        view.draw_over(&mut right, self.threads);
         // The two sensors of a pair never expose quite alike.
         let moments = [self.moment(0, 1.0), self.moment(1, 1.03)];
         let grey = self.exposures[0].grey(left, &moments[0]);
         let image = self.exposures[1].grey(&right, &moments[1]);
+        self.canvases.push(right);
         let right = RightImage { image, baseline_m: self.scene.camera.baseline_m };
         Images { grey: Some(Arc::new(grey)), right: Some(Arc::new(right)), ..Images::default() }
     }
 
     fn in_lens(
         &self,
+        mut seen: HitImage,
         world: &World,
         uppers: &[usize],
         pose: &Isometry3<f64>,
-    ) -> (Image<Hit>, Vec<Truth>) {
+    ) -> (HitImage, Vec<Truth>) {
         let (camera, lit) = (&self.true_camera, self.scene.camera.colour);
         let view = WorldCamera { world, camera, pose: &|part| self.world_from_robot(part), lit };
-        let seen = view.draw(self.threads);
+        view.draw_over(&mut seen, self.threads);
         let truth = self.truth(
             (world, uppers, pose),
             |of, skeleton| sight(&view, &seen, of, skeleton),
@@ -590,7 +611,7 @@ impl Simulation {
         world: &World,
         uppers: &[usize],
         pose: &Isometry3<f64>,
-    ) -> (Image<Hit>, Vec<Truth>) {
+    ) -> (HitImage, Vec<Truth>) {
         let world_from_camera = pose * self.true_camera.robot_from_camera;
         let seen = mirror.draw(world, &world_from_camera, self.threads);
         let truth = self.truth(
@@ -635,7 +656,7 @@ impl Simulation {
 /// part of it.
 fn sight(
     view: &WorldCamera<'_>,
-    seen: &Image<Hit>,
+    seen: &HitImage,
     of: (u16, &[Shape]),
     skeleton: &Skeleton,
 ) -> (Option<Rect>, Visibility) {

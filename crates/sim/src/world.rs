@@ -6,9 +6,10 @@ use std::sync::{Arc, OnceLock};
 use nalgebra::{Point3, Vector3};
 
 use crate::daylight::Windows;
+use crate::hits::HitGroup;
 use crate::lanes::{LANES, Lanes, Vectors, dot};
 use crate::material::{Colour, Material};
-use crate::shadow::{self, Shadows, cells, coarse_cells};
+use crate::shadow::{self, Bundle, Shadows, bits};
 use crate::shape::{Shape, Surface};
 use crate::slice::Slice;
 
@@ -49,6 +50,9 @@ const WASHED_OUT_LUX: f64 = 200.0;
 /// Least cosine between the direction of sound and the normal of a large smooth surface that sends it
 /// back: that of 30 degrees.
 const ECHO_COSINE: f64 = 0.866;
+
+/// Ways to lamps begin this far off a surface, which would otherwise shade itself, m.
+const OFF_SURFACE_M: f64 = 1e-3;
 
 /// A lamp: a point that shines on all sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -237,47 +241,75 @@ impl World {
         lux
     }
 
-    /// Returns how points of the surface of a solid appear, of which only the `wanted` ones count;
-    /// without colours if it is not `lit`.
+    /// Finds the solids that may shade points in a box, given by two of its corners.
+    pub(crate) fn find_shading(
+        &self,
+        low: &Vector3<f64>,
+        high: &Vector3<f64>,
+        lit: bool,
+        found: &mut Shading,
+    ) {
+        found.0.resize_with(self.stage.lamps.len(), Default::default);
+        // Ways begin a little off the surface.
+        let off = Vector3::repeat(2.0 * OFF_SURFACE_M);
+        for ((lamp, shadows), found) in
+            self.stage.lamps.iter().zip(self.shadows()).zip(&mut found.0)
+        {
+            if lit || lamp.is_sun() {
+                let bundle = Bundle::new(low - off - lamp.at.coords, high + off - lamp.at.coords);
+                for (shadows, found) in shadows.into_iter().zip(found) {
+                    shadows.find(&bundle, found);
+                }
+            }
+        }
+    }
+
+    /// Returns true if the appearance of a surface depends on shadows.
+    pub(crate) fn has_shadows(&self, lit: bool) -> bool {
+        lit || self.stage.lamps.iter().any(Lamp::is_sun)
+    }
+
+    /// Writes light and infrared of points of the surface of a solid, of which only the `wanted` ones
+    /// count; without colours if it is not `lit`. `shading` are the solids that may shade them.
     pub(crate) fn shine(
         &self,
         of: &Material,
         points: &Vectors,
         surface: &Surface,
         wanted: &[bool; LANES],
-        lit: bool,
-    ) -> Shine {
+        (shading, lit): (&Shading, bool),
+        to: &mut HitGroup,
+    ) {
         let is_sunny = self.stage.lamps.iter().any(Lamp::is_sun);
-        let mut shine = Shine { light: [[0.0; LANES]; 3], infrared: [of.infrared; LANES] };
+        to.infrared = [of.infrared; LANES];
+        if !lit {
+            to.light = [[0.0; LANES]; 3];
+        }
         if !lit && !is_sunny {
-            return shine;
+            return;
         }
         let mut lux = ambient(self.stage.ambient_lux, &surface.normal);
         let mut sun = [0.0; LANES];
-        let lamps = self.stage.lamps.iter().zip(self.shadows());
-        for (lamp, shadows) in lamps.filter(|(lamp, _)| lit || lamp.is_sun()) {
+        let lamps = self.stage.lamps.iter().zip(self.shadows()).zip(&shading.0);
+        for ((lamp, shadows), found) in lamps.filter(|((lamp, _), _)| lit || lamp.is_sun()) {
             let beams = beams(lamp, points, &surface.normal);
-            let mut open = std::array::from_fn(|lane| wanted[lane] && beams.lux[lane] != 0.0);
-            if open != [false; LANES] {
-                let [stage, people] = shadows;
-                let fine = cells(&beams.ways, shadow::FINE);
-                stage.darken(&beams.ways, &fine, &mut open);
-                people.darken(&beams.ways, &coarse_cells(&fine), &mut open);
+            let facing = std::array::from_fn(|lane| wanted[lane] && beams.lux[lane] != 0.0);
+            let mut open = bits(&facing);
+            for (shadows, numbers) in shadows.into_iter().zip(found) {
+                open &= !shadows.bar(numbers, &beams.ways, open);
             }
-            for lane in 0..LANES {
-                let on = if open[lane] { beams.lux[lane] } else { 0.0 };
-                lux[lane] += on;
-                sun[lane] += if lamp.is_sun() { on } else { 0.0 };
+            add_light(&beams.lux, open, &mut lux);
+            if lamp.is_sun() {
+                add_light(&beams.lux, open, &mut sun);
             }
         }
         if is_sunny {
-            shine.infrared = sun.map(|sun| left_over(of.infrared, sun));
+            to.infrared = sun.map(|sun| left_over(of.infrared, sun));
         }
         if lit {
             let colours = of.colours(&surface.own, wanted);
-            shine.light = colours.map(|c| std::array::from_fn(|i| c[i] * (lux[i] + of.glow_lux)));
+            reflect(&colours, &lux, of.glow_lux, &mut to.light);
         }
-        shine
     }
 
     /// Returns the shadows around each lamp: those of the stage, and those of people.
@@ -288,13 +320,10 @@ impl World {
     }
 }
 
-/// Appearance of points of a surface.
-pub(crate) struct Shine {
-    /// Light towards the eye in each colour, lx times reflectance.
-    pub light: [Lanes; 3],
-    /// See [`Hit::infrared`].
-    pub infrared: Lanes,
-}
+/// Solids that may stand between each lamp and some points: numbers of those of the stage and of
+/// those of people.
+#[derive(Debug, Default)]
+pub(crate) struct Shading(Vec<[Vec<u32>; 2]>);
 
 /// Returns the first of some solids that a ray meets, and its distance in lengths of the ray.
 fn meet<'a>(
@@ -332,7 +361,29 @@ fn shadows(side: usize, lamps: &[Lamp], objects: &[Object]) -> Vec<Shadows> {
 /// Illuminance by the light from everywhere, of surfaces with these normals.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn ambient(lux: f64, normals: &Vectors) -> Lanes {
-    normals.z.map(|z| lux * (0.75 + 0.25 * z))
+    let mut ambient = [0.0; LANES];
+    for lane in 0..LANES {
+        ambient[lane] = lux * (0.75 + 0.25 * normals.z[lane]);
+    }
+    ambient
+}
+
+/// Adds the light of a lamp where the way from it is open, by the bits of lanes.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn add_light(of: &Lanes, open: u32, to: &mut Lanes) {
+    for lane in 0..LANES {
+        to[lane] += if open >> lane & 1 == 1 { of[lane] } else { 0.0 };
+    }
+}
+
+/// Writes the light that surfaces of some colours send on, with their own.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn reflect(colours: &[Lanes; 3], lux: &Lanes, glow_lux: f64, light: &mut [Lanes; 3]) {
+    for channel in 0..3 {
+        for lane in 0..LANES {
+            light[channel][lane] = colours[channel][lane] * (lux[lane] + glow_lux);
+        }
+    }
 }
 
 /// Ways from a lamp to some points, and the illuminance there if nothing is in the way.
@@ -382,8 +433,7 @@ impl Lamp {
     /// lx; zero where it faces away. Without branches, for loops over lanes.
     #[inline(always)]
     fn beam(&self, at: &Vector3<f64>, normal: &Vector3<f64>) -> (Vector3<f64>, f64) {
-        // A start a little off the surface, which would otherwise shade itself.
-        let start = at + normal * 1e-3;
+        let start = at + normal * OFF_SURFACE_M;
         let way = self.at.coords - start;
         let square = dot(&way, &way);
         let cosine = dot(normal, &way) / square.sqrt();

@@ -225,7 +225,10 @@ impl Recorder {
     }
 
     fn depth(&mut self, at: Stamp, header: &Header, depth: &DepthImage) -> Result<(), WriteError> {
-        let data: Vec<u8> = depth.pixels().iter().flat_map(|z| millimetres(*z)).collect();
+        let mut data = vec![0; 2 * depth.pixels().len()];
+        for (to, metres) in data.chunks_exact_mut(2).zip(depth.pixels()) {
+            to.copy_from_slice(&millimetres(*metres));
+        }
         let message = self.raw(header, "16UC1", 2, &data);
         self.log.send("/camera/aligned_depth_to_color/image_raw", at, &message)
     }

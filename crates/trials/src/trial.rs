@@ -1,11 +1,11 @@
 use cpu_time::ThreadTime;
 use nalgebra::Isometry2;
 use tagalong_config::Registry;
-use tagalong_core::{Funnel, Stamp};
+use tagalong_core::{Funnel, Input, Inputs, Stamp};
 use tagalong_eval::EvalError;
 use tagalong_geometry::Camera;
 use tagalong_pipeline::{FrameReport, Pipeline, StepError};
-use tagalong_sim::{Furniture, Scene, Truth};
+use tagalong_sim::{CameraKind, Furniture, Scene, Truth};
 use tagalong_stereo::{StereoDepth, StereoSettings};
 
 use crate::{Contender, Draw, SimulatedFrame};
@@ -126,10 +126,12 @@ impl Trial {
         threads: usize,
         mut prepare: impl FnMut(SimulatedFrame) -> Result<SimulatedFrame, TrialError>,
     ) -> Result<Self, TrialError> {
-        let mut draw = Draw::new(scene, threads);
+        let mut lanes = Lane::all(scene, contenders, registry)?;
+        let all = lanes.iter().map(|lane| lane.pipeline.inputs());
+        let inputs = all.reduce(Inputs::union).unwrap_or(Inputs::NONE);
+        let mut draw = Draw::new(&without_unused_colour(scene, inputs, false), threads);
         let furniture = draw.simulation().furniture().to_vec();
         let camera = draw.camera().clone();
-        let mut lanes = Lane::all(scene, contenders, registry)?;
         let mut moments = Vec::new();
         while let Some(simulated) = draw.next_frame() {
             let simulated = prepare(simulated)?;
@@ -139,6 +141,18 @@ impl Trial {
         let runs = lanes.into_iter().map(|lane| lane.run).collect();
         Ok(Self { seed: scene.seed, camera, furniture, moments, runs })
     }
+}
+
+/// Returns the scene without colour images where nobody looks at them: they take more than half of the
+/// time of an image with depth, and change nothing else.
+pub(crate) fn without_unused_colour(scene: &Scene, inputs: Inputs, are_images_used: bool) -> Scene {
+    let mut scene = scene.clone();
+    let camera = &mut scene.camera;
+    let may_lack_colour = camera.kind == CameraKind::Rgbd && camera.depth_offset_s == 0.0;
+    if may_lack_colour && !are_images_used && !inputs.uses(Input::Colour) {
+        camera.colour = false;
+    }
+    scene
 }
 
 impl Moment {
@@ -204,5 +218,21 @@ mod tests {
         let wrong = StereoSettings { window: 4, ..stereo };
         let error = of_pairs("stereo", &wrong).unwrap_err();
         assert!(matches!(error, TrialError::Config(_)), "{error}");
+    }
+
+    #[test]
+    fn colours_are_left_out_where_nobody_looks_at_them() {
+        fn renders_colour(settings: &str, inputs: Inputs, are_images_used: bool) -> bool {
+            let scene = Scene::parse(&format!("duration_s = 1.0\n{settings}")).unwrap();
+            without_unused_colour(&scene, inputs, are_images_used).camera.colour
+        }
+
+        let depth = Inputs::NONE.require(Input::Depth);
+        assert!(!renders_colour("", depth, false));
+        assert!(renders_colour("", depth.accept(Input::Colour), false));
+        assert!(renders_colour("", depth, true), "a log of the ride has its images");
+        // Scenes that may not be without.
+        assert!(renders_colour("[camera]\ndepth_offset_s = 0.01\n", depth, false));
+        assert!(renders_colour("[camera]\nkind = \"stereo\"\n", depth, false));
     }
 }

@@ -1,12 +1,11 @@
 //! Joints of people in the truth.
 
 use nalgebra::{Isometry3, Point2, Point3};
-use tagalong_core::Image;
 
 use crate::body::Skeleton;
+use crate::hits::HitImage;
 use crate::mirror::MirrorCamera;
 use crate::render::WorldCamera;
-use crate::world::Hit;
 
 /// The surface of a body lies at most this far before its joints, m; what is farther before them
 /// is another part of it.
@@ -49,7 +48,7 @@ pub(super) fn joints(
 /// Returns how a joint of a person appears in an image through a lens.
 pub(super) fn in_lens(
     view: &WorldCamera<'_>,
-    seen: &Image<Hit>,
+    seen: &HitImage,
     person: u16,
     joint: &Point3<f64>,
 ) -> Spot {
@@ -65,7 +64,7 @@ pub(super) fn in_lens(
 /// Returns how a joint of a person appears in the unwrapped image of a mirror.
 pub(super) fn in_mirror(
     mirror: &MirrorCamera,
-    raw: &Image<Hit>,
+    raw: &HitImage,
     world_from_camera: &Isometry3<f64>,
     person: u16,
     joint: &Point3<f64>,

@@ -315,6 +315,10 @@ impl Witness for ApproachWatch<'_> {
     fn goes_on(&self) -> bool {
         !self.over && self.witness.goes_on()
     }
+
+    fn uses_images(&self) -> bool {
+        self.witness.uses_images()
+    }
 }
 
 #[cfg(test)]

@@ -22,6 +22,7 @@ use tagalong_sim::{
     ScheduledFault, Simulation,
 };
 
+use crate::trial::without_unused_colour;
 use crate::{Contender, Draw, Moment, SimulatedFrame, TrialError};
 
 /// Steps between two looks at the approacher.
@@ -42,10 +43,20 @@ pub trait Witness {
     fn goes_on(&self) -> bool {
         true
     }
+
+    /// Returns true if it uses the images: colours that neither it nor the pipeline uses are not
+    /// rendered.
+    fn uses_images(&self) -> bool {
+        true
+    }
 }
 
 /// No observer.
-impl Witness for () {}
+impl Witness for () {
+    fn uses_images(&self) -> bool {
+        false
+    }
+}
 
 /// The robot at a step of the simulation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -143,6 +154,7 @@ impl Ride {
         Self::check_sensors(scene, &pipeline, &contender.name)?;
         // The simulated base executes the commands.
         pipeline.set_driving(true);
+        let scene = &without_unused_colour(scene, pipeline.inputs(), witness.uses_images());
         let mut draw = Draw::live(scene, 1);
         let mut ride = Self {
             seed: scene.seed,

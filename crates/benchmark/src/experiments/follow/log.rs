@@ -106,6 +106,10 @@ impl Witness for RideLog {
         // A ride without its log is of no use, so a failed disk ends it.
         self.failed.is_none() && self.signals.received().is_none()
     }
+
+    fn uses_images(&self) -> bool {
+        self.recorder.is_some() || self.files.is_some()
+    }
 }
 
 fn frame_json(report: &FrameReport) -> FrameJson {

@@ -1,0 +1,256 @@
+//! Square parts of an image. Their pixels are sorted by the solids that their rays meet, because
+//! surfaces are rendered for [`LANES`] pixels of one solid at a time, wherever in the tile they are.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::hits::HitGroup;
+use crate::lanes::{LANES, Lanes, Vectors, points};
+use crate::seen::Met;
+use crate::shadow::{bits, bounds};
+use crate::sight::SightedSolid;
+use crate::world::Shading;
+
+/// A tile, with room that is used again for the next one.
+pub struct Tile {
+    sorted: SortedTile,
+    shading: Shading,
+    group: HitGroup,
+}
+
+/// A tile in work.
+pub struct TileParts<'a> {
+    /// Its pixels.
+    pub tile: &'a SortedTile,
+    /// Room for the solids that may shade it.
+    pub shading: &'a mut Shading,
+    /// Room for pixels of several rows.
+    pub group: &'a mut HitGroup,
+}
+
+/// Pixels of a tile by the solids that they show.
+#[derive(Default)]
+pub struct SortedTile {
+    /// The first `used` ones are of this tile.
+    batches: Vec<Batch>,
+    used: usize,
+    /// Batches of the same solid follow each other.
+    entries: Vec<Entry>,
+    /// Rows in which not all pixels show the same solid, by their numbers.
+    rows: Vec<(u8, TileRow)>,
+    /// Pixels of these rows.
+    pixels: Vec<Pixel>,
+}
+
+/// A batch by its solid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Entry {
+    /// Place of the solid among those of the tile.
+    pub solid: u32,
+    batch: u32,
+}
+
+/// A pixel in a row that shows several solids.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Pixel {
+    solid: u32,
+    /// Place of the row among those of its kind.
+    row: u8,
+    column: u8,
+}
+
+/// A row of rays.
+#[derive(Clone, Copy)]
+struct TileRow {
+    rays: Vectors,
+    points: Vectors,
+    t: Lanes,
+}
+
+/// Rays that meet the same solid.
+#[derive(Clone)]
+pub struct Batch {
+    /// Lanes in use, from the first on.
+    pub count: usize,
+    /// The rays.
+    pub rays: Vectors,
+    /// Where they meet the solid.
+    pub points: Vectors,
+    /// After so many lengths of the rays.
+    pub t: Lanes,
+    /// Row and column of each pixel in the tile.
+    places: [[u8; 2]; LANES],
+    row: Option<u8>,
+}
+
+impl Default for Tile {
+    fn default() -> Self {
+        let sorted = SortedTile::default();
+        Self { sorted, shading: Shading::default(), group: HitGroup::NOTHING }
+    }
+}
+
+impl Tile {
+    /// Casts some columns and rows of rays towards the solids that they may meet; `rays` writes those
+    /// of a row.
+    pub fn look(
+        &mut self,
+        solids: &[&SightedSolid<'_>],
+        eye: &Point3<f64>,
+        [columns, rows]: [usize; 2],
+        rays: impl Fn(usize, &mut Vectors),
+    ) {
+        let tile = &mut self.sorted;
+        tile.used = 0;
+        tile.entries.clear();
+        tile.rows.clear();
+        tile.pixels.clear();
+        for row in 0..rows {
+            let batch = tile.next_batch();
+            rays(row, &mut batch.rays);
+            let met = first(solids, &batch.rays);
+            points(eye, &batch.rays, &met.t, &mut batch.points);
+            batch.t = met.t;
+            let solid = met.number[0];
+            let is_whole = columns == LANES && met.number == [solid; LANES] && solid != Met::NONE;
+            if is_whole {
+                batch.count = LANES;
+                batch.row = Some(row as u8);
+                tile.keep_batch(solid as u32);
+            } else {
+                tile.mix(row as u8, &met.number[..columns]);
+            }
+        }
+        tile.sort();
+    }
+
+    /// Returns the rows in which not all pixels show the same solid.
+    pub fn mixed_rows(&self) -> impl Iterator<Item = usize> {
+        self.sorted.rows.iter().map(|(number, _)| usize::from(*number))
+    }
+
+    /// Returns the parts of the tile that are used together.
+    pub fn parts(&mut self) -> TileParts<'_> {
+        let Self { sorted, shading, group } = self;
+        TileParts { tile: sorted, shading, group }
+    }
+}
+
+impl SortedTile {
+    /// Returns the batches by their solids.
+    pub fn solids(&self) -> impl Iterator<Item = &[Entry]> {
+        self.entries.chunk_by(|one, next| one.solid == next.solid)
+    }
+
+    /// Returns a batch.
+    pub fn batch(&self, entry: Entry) -> &Batch {
+        &self.batches[entry.batch as usize]
+    }
+
+    /// Returns the corners of a box around the points of some batches.
+    pub fn bounds_of(&self, entries: &[Entry]) -> [Vector3<f64>; 2] {
+        let mut low = Vector3::repeat(f64::INFINITY);
+        let mut high = -low;
+        for entry in entries {
+            let batch = self.batch(*entry);
+            let (from, to) = bounds(&batch.points, bits(&batch.wanted()));
+            low = low.inf(&from);
+            high = high.sup(&to);
+        }
+        [low, high]
+    }
+
+    /// Returns the batch after those in use.
+    fn next_batch(&mut self) -> &mut Batch {
+        if self.used == self.batches.len() {
+            self.batches.push(Batch::empty());
+        }
+        &mut self.batches[self.used]
+    }
+
+    fn keep_batch(&mut self, solid: u32) {
+        self.entries.push(Entry { solid, batch: self.used as u32 });
+        self.used += 1;
+    }
+
+    /// Puts the row of the next batch aside, whose pixels show several solids.
+    fn mix(&mut self, row: u8, numbers: &[u64]) {
+        let Batch { rays, points, t, .. } = &self.batches[self.used];
+        let place = self.rows.len() as u8;
+        self.rows.push((row, TileRow { rays: *rays, points: *points, t: *t }));
+        for (column, number) in (0..).zip(numbers) {
+            if *number != Met::NONE {
+                self.pixels.push(Pixel { solid: *number as u32, row: place, column });
+            }
+        }
+    }
+
+    /// Makes batches of the pixels that were put aside, and sorts all of them.
+    fn sort(&mut self) {
+        let mut pixels = std::mem::take(&mut self.pixels);
+        pixels.sort_unstable();
+        for same in pixels.chunk_by(|one, next| one.solid == next.solid) {
+            for part in same.chunks(LANES) {
+                let rows = std::mem::take(&mut self.rows);
+                self.next_batch().gather(part, &rows);
+                self.rows = rows;
+                self.keep_batch(part[0].solid);
+            }
+        }
+        self.pixels = pixels;
+        self.entries.sort_unstable();
+    }
+}
+
+impl Batch {
+    fn empty() -> Self {
+        Self {
+            count: 0,
+            rays: Vectors::ZERO,
+            points: Vectors::ZERO,
+            t: [0.0; LANES],
+            places: [[0; 2]; LANES],
+            row: None,
+        }
+    }
+
+    /// Returns true for each lane in use.
+    pub fn wanted(&self) -> [bool; LANES] {
+        std::array::from_fn(|lane| lane < self.count)
+    }
+
+    /// Returns the row that the batch is, from its first pixel to its last.
+    pub fn whole_row(&self) -> Option<usize> {
+        self.row.map(usize::from)
+    }
+
+    /// Returns row and column of each pixel of a batch that is no row.
+    pub fn places(&self) -> &[[u8; 2]] {
+        &self.places[..self.count]
+    }
+
+    fn gather(&mut self, pixels: &[Pixel], rows: &[(u8, TileRow)]) {
+        self.count = pixels.len();
+        self.row = None;
+        for (lane, pixel) in pixels.iter().enumerate() {
+            let (number, row) = &rows[usize::from(pixel.row)];
+            let column = usize::from(pixel.column);
+            self.places[lane] = [*number, pixel.column];
+            self.rays.set(lane, &row.rays.at(column));
+            self.points.set(lane, &row.points.at(column));
+            self.t[lane] = row.t[column];
+        }
+    }
+}
+
+/// The first solid that each ray of depth one meets, by its place among solids that are sorted.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn first(sights: &[&SightedSolid<'_>], rays: &Vectors) -> Met {
+    let mut met = Met::NOTHING;
+    for (number, sight) in (0..).zip(sights) {
+        if !met.reaches(sight.nearest) {
+            break;
+        }
+        sight.seen.shorten(rays, sight.nearest, number, &mut met);
+    }
+    met
+}
