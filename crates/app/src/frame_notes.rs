@@ -7,7 +7,9 @@ use nalgebra::{Isometry2, Point3};
 use serde::{Deserialize, Serialize};
 use tagalong_core::Funnel;
 use tagalong_geometry::{Camera, Rect};
-use tagalong_pipeline::{Candidate, Fate, FrameReport, ObstaclePoint};
+use tagalong_pipeline::{
+    Candidate, Fate, FrameReport, IdentityCorrection, IdentityDoubt, ObstaclePoint,
+};
 
 /// Topic of the notes in `tracks.mcap`, one JSON text per frame.
 pub const FRAME_NOTES_TOPIC: &str = "/people/frames_json";
@@ -29,9 +31,33 @@ pub struct FrameNotes {
     pub dropped: Vec<DroppedNote>,
     /// Numbers of the tracks that ended in this frame.
     pub ended: Vec<u32>,
+    /// Tracks whose ID may be that of another person.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub doubts: Vec<DoubtNote>,
+    /// IDs of earlier frames that this frame shows to be wrong.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub corrections: Vec<CorrectionNote>,
     /// The target lock and the command, where the pipeline has a controller.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub drive: Option<DriveNote>,
+}
+
+/// Track whose ID may be that of another person.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct DoubtNote {
+    /// ID of the track.
+    pub id: u32,
+    /// IDs of the people with whom it may have changed over.
+    pub others: Vec<u32>,
+}
+
+/// Two IDs that were the wrong way round.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CorrectionNote {
+    /// First frame in which they were.
+    pub since: u64,
+    /// The two IDs.
+    pub ids: [u32; 2],
 }
 
 /// State of the target lock, and the command for the wheels.
@@ -129,8 +155,22 @@ impl FrameNotes {
                 .collect(),
             dropped: dropped(&report.funnel),
             ended: report.ended.iter().map(|id| id.0).collect(),
+            doubts: report.doubts.iter().map(DoubtNote::of).collect(),
+            corrections: report.corrections.iter().map(CorrectionNote::of).collect(),
             drive: DriveNote::of(report, odom_from_robot),
         }
+    }
+}
+
+impl DoubtNote {
+    fn of(doubt: &IdentityDoubt) -> Self {
+        Self { id: doubt.track.0, others: doubt.others.iter().map(|id| id.0).collect() }
+    }
+}
+
+impl CorrectionNote {
+    fn of(correction: &IdentityCorrection) -> Self {
+        Self { since: correction.since, ids: correction.ids.map(|id| id.0) }
     }
 }
 
@@ -241,6 +281,8 @@ mod tests {
         report.funnel.drop_at("head width", Rect::default());
         report.funnel.drop_many("score", 5);
         report.ended = vec![TrackId(2)];
+        report.doubts = vec![IdentityDoubt { track: TrackId(3), others: vec![TrackId(4)] }];
+        report.corrections = vec![IdentityCorrection { since: 5, ids: [TrackId(3), TrackId(4)] }];
         let turned = Isometry2::new(Vector2::new(1.0, 0.0), std::f64::consts::FRAC_PI_2);
         let notes = FrameNotes::of(&report, &camera(), &turned);
         assert_eq!((notes.frame, notes.stamp_ns, notes.image_px), (7, 9, [640, 480]));
@@ -253,6 +295,8 @@ mod tests {
         assert_eq!(notes.dropped[0].boxes_px, [[1.0, 2.0, 3.0, 4.0]]);
         assert_eq!((notes.dropped[1].count, notes.dropped[1].boxes_px.len()), (5, 0));
         assert_eq!(notes.ended, [2]);
+        assert_eq!(notes.doubts, [DoubtNote { id: 3, others: vec![4] }]);
+        assert_eq!(notes.corrections, [CorrectionNote { since: 5, ids: [3, 4] }]);
     }
 
     #[test]

@@ -261,7 +261,8 @@ Examples:
 const RUN_HELP: &str = "\
 Files: tracks.mcap (for `tagalong view`, Foxglove and Rerun), tracks.csv (MOTChallenge columns,
 pixels), tracks-metres.csv, joints.csv (where a pose network runs), report.json (what was dropped and
-why), timings.json, origin.json, and with --overlay overlay/000001.png and so on.
+why), timings.json, origin.json, with --smoothed tracks-smoothed.csv, and with --overlay
+overlay/000001.png and so on.
 
 Examples:
   tagalong run --overlay --overwrite       (built-in config, simulated log)

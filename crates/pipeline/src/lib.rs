@@ -118,7 +118,7 @@ pub use tagalong_following::{
 pub use tagalong_stereo::StereoSettings;
 pub use tagalong_tracking::StepError;
 pub use tagalong_tracking::{
-    BirthSettings, Candidate, ClockSettings, DetectorSettings, Fate, MergeSettings,
-    OcclusionSettings, Outcome, Role, Weighing,
+    BirthSettings, Candidate, ClockSettings, DetectorSettings, Fate, IdentityCorrection,
+    IdentityDoubt, MergeSettings, OcclusionSettings, Outcome, Role, Weighing,
 };
 pub use tagalong_vision::odometry::{MotionSource, OdometrySettings};

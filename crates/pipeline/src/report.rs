@@ -1,7 +1,9 @@
 use std::sync::Arc;
 
 use tagalong_core::{Command, EgoMotion, Funnel, Joints, Stamp, Track, TrackId, Visualisation};
-use tagalong_tracking::{Candidate, Outcome, TrackingReport, Weighing, joints_of};
+use tagalong_tracking::{
+    Candidate, IdentityCorrection, IdentityDoubt, Outcome, TrackingReport, Weighing, joints_of,
+};
 
 use crate::{LockReport, ObstaclePoint};
 
@@ -49,6 +51,10 @@ pub struct FrameReport {
     pub plugin_timings: Vec<(String, f64)>,
     /// Tracks that ended in this frame.
     pub ended: Vec<TrackId>,
+    /// Tracks whose ID may be that of another person.
+    pub doubts: Vec<IdentityDoubt>,
+    /// IDs of earlier frames that this frame shows to be wrong, to be applied one after the other.
+    pub corrections: Vec<IdentityCorrection>,
 }
 
 impl FrameReport {
@@ -70,6 +76,7 @@ impl From<TrackingReport> for FrameReport {
             tracking;
         let TrackingReport { nis, weighing, visualisation, timings, plugin_timings, ended, .. } =
             tracking;
+        let TrackingReport { doubts, corrections, .. } = tracking;
         Self {
             index,
             stamp,
@@ -88,6 +95,8 @@ impl From<TrackingReport> for FrameReport {
             timings,
             plugin_timings,
             ended,
+            doubts,
+            corrections,
         }
     }
 }

@@ -122,7 +122,9 @@ pub use guarded::{Guarded, StepError};
 pub use memo::Identities;
 pub use preprocess::{Preprocessed, Preprocessor};
 pub use reidentification::{AppearanceEvidence, ReidentificationSettings};
-pub use report::{Candidate, Fate, Outcome, TrackingReport, joints_of};
+pub use report::{
+    Candidate, Fate, IdentityCorrection, IdentityDoubt, Outcome, TrackingReport, joints_of,
+};
 pub use search::DetectorSlot;
 pub use settings::{
     BirthSettings, ClockSettings, DetectorSettings, MergeSettings, OcclusionSettings, Role,

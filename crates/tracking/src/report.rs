@@ -95,6 +95,26 @@ impl Outcome {
     }
 }
 
+/// Reported track whose ID may be that of another person: it was close to the tracks of others, and
+/// the appearances since then do not yet tell which person is which.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct IdentityDoubt {
+    /// ID of the track.
+    pub track: TrackId,
+    /// IDs of the people with whom it may have changed over, rising.
+    pub others: Vec<TrackId>,
+}
+
+/// Two IDs that were reported the wrong way round for a while. One of them may belong to nobody in
+/// these frames: a person who was recognised some frames after the start of a track.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct IdentityCorrection {
+    /// Index of the first frame in which they are wrong; the frame of the report is right.
+    pub since: u64,
+    /// The two IDs.
+    pub ids: [TrackId; 2],
+}
+
 /// Results of one frame.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
@@ -127,6 +147,10 @@ pub struct TrackingReport {
     pub plugin_timings: Vec<(String, f64)>,
     /// Tracks that ended in this frame.
     pub ended: Vec<TrackId>,
+    /// Tracks whose ID may be that of another person.
+    pub doubts: Vec<IdentityDoubt>,
+    /// IDs of earlier frames that this frame shows to be wrong, to be applied one after the other.
+    pub corrections: Vec<IdentityCorrection>,
 }
 
 impl TrackingReport {
@@ -146,6 +170,8 @@ impl TrackingReport {
             timings: Vec::new(),
             plugin_timings: Vec::new(),
             ended: Vec::new(),
+            doubts: Vec::new(),
+            corrections: Vec::new(),
         }
     }
 }

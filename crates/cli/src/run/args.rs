@@ -35,6 +35,10 @@ pub struct RunArgs {
     /// Put the images into tracks.mcap, too, as JPEG, so that one file opens to a whole scene.
     #[arg(long)]
     pub with_images: bool,
+    /// Write tracks-smoothed.csv, too: tracks.csv with the IDs put right that later frames showed to be
+    /// wrong. For records; a robot could not have had these IDs in time.
+    #[arg(long)]
+    pub smoothed: bool,
     /// Replace the files of an earlier run in the same directory.
     #[arg(long)]
     pub overwrite: bool,
@@ -108,6 +112,7 @@ impl RunArgs {
             output: Some(output),
             overlay: None,
             with_images: false,
+            smoothed: false,
             overwrite: true,
             strict: false,
             threads: None,

@@ -318,6 +318,7 @@ impl Desk {
         };
         let log = TrackLog::create(dir, names, job.outer.output.clone(), job.resolved.to_toml())
             .map_err(refused)?;
+        let log = if args.smoothed { log.with_smoothed() } else { log };
         let tally = Tally::default();
         let timings = Timings::default();
         let remedies = job.remedies.clone();
@@ -353,6 +354,9 @@ impl Desk {
             command: report.command.map(|command| command.wheels),
         };
         self.log.write(&record)?;
+        for correction in &report.corrections {
+            self.log.correct(correction.since, report.index, correction.ids);
+        }
         let notes = FrameNotes::of(report, &item.frame.frame.camera, &item.frame.odom_from_robot);
         self.log.write_json(FRAME_NOTES_TOPIC, report.stamp, &notes)?;
         self.timings.add("write", ms_since(writing));

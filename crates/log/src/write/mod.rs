@@ -1,5 +1,6 @@
 //! Files of a run: `tracks.mcap`, `tracks.csv`, `tracks-metres.csv`, `report.json`,
-//! `timings.json` and `origin.json`, and `joints.csv` where a detector finds joints.
+//! `timings.json` and `origin.json`, `joints.csv` where a detector finds joints, and
+//! `tracks-smoothed.csv` where it is asked for.
 //!
 //! All are written under partial names and get their final names together at the end of the run, so
 //! that the files of a crash are never mistaken for a result. At least once per second of log time
@@ -16,6 +17,7 @@ mod messages;
 mod record;
 mod run_dir;
 mod scene;
+mod smoothed;
 #[cfg(test)]
 mod testing;
 #[cfg(test)]
@@ -24,7 +26,7 @@ mod trails;
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 pub use colours::{TRACK_COLOURS, track_colour};
@@ -38,7 +40,8 @@ pub use record::{BoxedPart, FrameRecord, OutputSettings};
 pub use run_dir::RunDir;
 pub use scene::{markers, no_markers};
 use serde::Serialize;
-use tagalong_core::Stamp;
+use smoothed::Correction;
+use tagalong_core::{Stamp, TrackId};
 pub use trails::Trails;
 
 /// Log time after which everything written is flushed, s.
@@ -64,6 +67,8 @@ pub struct TrackLog {
     metres: BufWriter<File>,
     /// Opened by the first joints.
     joints: Option<BufWriter<File>>,
+    /// IDs that were wrong, for `tracks-smoothed.csv`; `None` where that is not wanted.
+    corrections: Option<Vec<Correction>>,
     flushed: Option<Stamp>,
 }
 
@@ -84,7 +89,30 @@ impl TrackLog {
         let boxes = dir.open("tracks.csv")?;
         let mut metres = dir.open("tracks-metres.csv")?;
         writeln!(metres, "{METRES_HEADER}").map_err(WriteError::io(dir.path()))?;
-        Ok(Self { dir, output, mcap, boxes, metres, joints: None, flushed: None })
+        Ok(Self {
+            dir,
+            output,
+            mcap,
+            boxes,
+            metres,
+            joints: None,
+            corrections: None,
+            flushed: None,
+        })
+    }
+
+    /// Adds `tracks-smoothed.csv` to the files: `tracks.csv` with the IDs put right that later frames
+    /// show to be wrong. It is no result that was there in time.
+    #[must_use]
+    pub fn with_smoothed(mut self) -> Self {
+        self.corrections = Some(Vec::new());
+        self
+    }
+
+    /// Notes that two IDs are the wrong way round in frames before `noticed`, from `since` on.
+    pub fn correct(&mut self, since: u64, noticed: u64, ids: [TrackId; 2]) {
+        let correction = Correction { frames: since..noticed, ids: ids.map(|id| id.0) };
+        self.corrections.iter_mut().for_each(|all| all.push(correction.clone()));
     }
 
     /// Returns the directory of the run.
@@ -175,6 +203,13 @@ impl TrackLog {
         texts: &RunTexts<'_>,
     ) -> Result<PathBuf, WriteError> {
         self.flush_text()?;
+        if let Some(corrections) = &self.corrections {
+            let path = self.file("tracks.csv");
+            let boxes = File::open(&path).map_err(WriteError::io(&path))?;
+            let mut out = self.dir.open("tracks-smoothed.csv")?;
+            smoothed::write(BufReader::new(boxes), corrections, &mut out)
+                .map_err(WriteError::io(&self.file("tracks-smoothed.csv")))?;
+        }
         let mcap = self.file("tracks.mcap");
         self.mcap.finish(about).map_err(WriteError::mcap(&mcap))?;
         self.dir.put("report.json", texts.report.as_bytes())?;

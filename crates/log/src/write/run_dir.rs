@@ -18,10 +18,11 @@ pub struct RunDir {
 }
 
 /// Names of the files of a run, and of its page; only these are ever removed.
-const OWN_FILES: [&str; 8] = [
+const OWN_FILES: [&str; 9] = [
     "tracks.mcap",
     "tracks.csv",
     "tracks-metres.csv",
+    "tracks-smoothed.csv",
     "joints.csv",
     "report.json",
     "timings.json",

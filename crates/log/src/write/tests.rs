@@ -202,6 +202,33 @@ fn joints_are_in_the_log_and_in_a_file_of_their_own() {
 }
 
 #[test]
+fn corrected_ids_are_in_a_file_of_their_own_where_it_is_asked_for() {
+    let ids = [false, true].map(|is_wanted| {
+        let dir = tempfile::tempdir().unwrap();
+        let run = RunDir::create(dir.path(), true, Path::new("nowhere.mcap")).unwrap();
+        let log = TrackLog::create(run, names(), OutputSettings::default(), "").unwrap();
+        let mut log = if is_wanted { log.with_smoothed() } else { log };
+        for index in 1..=3 {
+            with_record(index, &[track(12)], |record| log.write(record)).unwrap();
+        }
+        log.correct(2, 3, [12, 13].map(TrackId));
+        let texts = RunTexts { report: "{}", timings: "{}", origin: "{}" };
+        log.finish(BTreeMap::new(), &texts).unwrap();
+        let files = ["tracks.csv", "tracks-smoothed.csv"].map(|name| dir.path().join(name));
+        files.map(|path| fs::read_to_string(path).ok().map(|text| first_cells(&text)))
+    });
+    let live = Some(vec!["1,12".to_owned(), "2,12".to_owned(), "3,12".to_owned()]);
+    let smoothed = Some(vec!["1,12".to_owned(), "2,13".to_owned(), "3,12".to_owned()]);
+    assert_eq!(ids, [[live.clone(), None], [live, smoothed]]);
+}
+
+/// Returns the frame and the ID of each row.
+fn first_cells(table: &str) -> Vec<String> {
+    let rows = table.lines().map(|row| row.split(',').take(2).collect::<Vec<_>>().join(","));
+    rows.collect()
+}
+
+#[test]
 fn two_runs_give_the_same_bytes() {
     let a = tempfile::tempdir().unwrap();
     let b = tempfile::tempdir().unwrap();

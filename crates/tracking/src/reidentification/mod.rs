@@ -22,7 +22,7 @@ use tagalong_vision::{Appearance, Describer};
 use person::{Identity, Person};
 pub use settings::{AppearanceEvidence, ReidentificationSettings};
 
-use crate::{Fate, TrackingReport};
+use crate::{Fate, IdentityCorrection, IdentityDoubt, TrackingReport};
 
 /// Numbers of the people of one frame.
 #[derive(Default)]
@@ -31,11 +31,17 @@ pub(crate) struct People {
     numbers: BTreeMap<TrackId, TrackId>,
     /// Numbers that were reported and belong to no person any more.
     given_up: Vec<TrackId>,
+    /// Tracks that may have changed over with others.
+    doubts: Vec<IdentityDoubt>,
+    /// Numbers of earlier frames that were wrong.
+    corrections: Vec<IdentityCorrection>,
 }
 
 impl People {
     /// Puts the numbers of the people in place of those of the tracks.
     pub(crate) fn renumber(self, report: &mut TrackingReport) {
+        report.doubts = self.doubts;
+        report.corrections = self.corrections;
         if self.numbers.is_empty() && self.given_up.is_empty() {
             return;
         }
@@ -81,14 +87,36 @@ impl Reidentifier {
         }
         self.predict(motion);
         self.release_ended(tracks);
-        self.note_rivals(tracks);
+        self.note_rivals(tracks, frame.index);
         self.add_appearances(frame, tracks)?;
-        self.tell_apart(tracks);
-        let given_up = self.recognise(tracks);
+        let mut people = People::default();
+        self.tell_apart(tracks, &mut people);
+        self.recognise(tracks, &mut people);
         self.note_reported(tracks);
-        let numbers = self.tracks.iter().map(|(id, identity)| (*id, identity.person.number));
-        let numbers = numbers.filter(|(id, number)| id != number).collect();
-        Ok(People { numbers, given_up })
+        for (id, identity) in &self.tracks {
+            if *id != identity.person.number {
+                people.numbers.insert(*id, identity.person.number);
+            }
+        }
+        people.doubts = self.doubts(tracks);
+        Ok(people)
+    }
+
+    /// Returns the confirmed tracks that may have changed over with others, from near to far.
+    fn doubts(&self, tracks: &[Track]) -> Vec<IdentityDoubt> {
+        let mut doubts = Vec::new();
+        for track in tracks.iter().filter(|track| track.confirmed) {
+            let Some(identity) = self.tracks.get(&track.id) else { continue };
+            // A new track has no number yet that could be another person's.
+            if !identity.is_new && !identity.rivals.is_empty() {
+                let track = identity.person.number;
+                doubts.push(IdentityDoubt {
+                    track,
+                    others: identity.rivals.iter().copied().collect(),
+                });
+            }
+        }
+        doubts
     }
 
     /// Returns the log-likelihood ratios of the appearances of tracks and detections, for the
@@ -168,22 +196,23 @@ impl Reidentifier {
     }
 
     /// Notes new tracks, and which tracks may change over.
-    fn note_rivals(&mut self, tracks: &[Track]) {
+    fn note_rivals(&mut self, tracks: &[Track], frame: u64) {
         for track in tracks {
-            self.tracks.entry(track.id).or_insert_with(|| Identity::new(track.id, place(track)));
+            let new = || Identity::new(track.id, place(track), frame);
+            self.tracks.entry(track.id).or_insert_with(new);
         }
         for (index, a) in tracks.iter().enumerate() {
             for b in &tracks[index + 1..] {
                 // Tentative tracks are left out: clutter beside a person is no rival.
                 let are_near = (place(a) - place(b)).norm() < self.settings.alone_m;
                 if are_near && a.confirmed && b.confirmed {
-                    self.add_rivals(a.id, b.id);
+                    self.add_rivals(a.id, b.id, frame);
                 }
             }
         }
     }
 
-    fn add_rivals(&mut self, a: TrackId, b: TrackId) {
+    fn add_rivals(&mut self, a: TrackId, b: TrackId, frame: u64) {
         let number = |id| self.tracks.get(&id).map(|identity| identity.person.number);
         let (Some(first), Some(second)) = (number(a), number(b)) else { return };
         for (id, rival) in [(a, second), (b, first)] {
@@ -193,6 +222,7 @@ impl Reidentifier {
                 // Appearances before this contact cannot tell which person left it.
                 if !identity.is_new {
                     identity.unsure.clear();
+                    identity.unsure_since = frame + 1;
                 }
             }
         }
@@ -221,7 +251,7 @@ impl Reidentifier {
     }
 
     /// Decides who is who among tracks that were near to each other.
-    fn tell_apart(&mut self, tracks: &[Track]) {
+    fn tell_apart(&mut self, tracks: &[Track], people: &mut People) {
         for track in tracks {
             let Some(identity) = self.tracks.get(&track.id) else { continue };
             let enough = identity.unsure.len() >= self.settings.appearances as usize;
@@ -229,7 +259,12 @@ impl Reidentifier {
                 continue;
             }
             match self.better_rival(identity) {
-                Some(number) => self.change_over(track.id, number),
+                Some(number) => {
+                    let since = identity.unsure_since;
+                    let ids = [identity.person.number, number];
+                    people.corrections.push(IdentityCorrection { since, ids });
+                    self.change_over(track.id, number);
+                }
                 None => self.settle(track.id),
             }
         }
@@ -290,9 +325,8 @@ impl Reidentifier {
         self.tracks.insert(id, identity);
     }
 
-    /// Recognises people that came back, and returns the numbers that were given up for that.
-    fn recognise(&mut self, tracks: &[Track]) -> Vec<TrackId> {
-        let mut given_up = Vec::new();
+    /// Recognises people that came back, and notes the numbers that are given up for that.
+    fn recognise(&mut self, tracks: &[Track], people: &mut People) {
         for track in tracks.iter().filter(|track| track.confirmed) {
             let Some(identity) = self.tracks.get(&track.id) else { continue };
             if !identity.is_new {
@@ -305,7 +339,13 @@ impl Reidentifier {
             let Some(identity) = self.tracks.get_mut(&track.id) else { continue };
             match returned {
                 Some(person) => {
-                    given_up.extend(reported.then_some(identity.person.number));
+                    if reported {
+                        let given_up = identity.person.number;
+                        let ids = [given_up, person.number];
+                        let since = identity.unsure_since;
+                        people.given_up.push(given_up);
+                        people.corrections.push(IdentityCorrection { since, ids });
+                    }
                     identity.person = person;
                     identity.person.see(place(track), track.velocity);
                     identity.settle();
@@ -314,7 +354,6 @@ impl Reidentifier {
                 None => {}
             }
         }
-        given_up
     }
 
     /// Returns the index of the absent person whose track this is.

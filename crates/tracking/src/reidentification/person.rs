@@ -125,10 +125,13 @@ pub(crate) struct Identity {
     pub(crate) reported: bool,
     /// Numbers of the people with whom the track may have changed over.
     pub(crate) rivals: BTreeSet<TrackId>,
+    /// Index of the first frame of which the number may be wrong: that of the start or, with rivals,
+    /// the one after the last contact.
+    pub(crate) unsure_since: u64,
 }
 
 impl Identity {
-    pub(crate) fn new(track: TrackId, place: Point2<f64>) -> Self {
+    pub(crate) fn new(track: TrackId, place: Point2<f64>, frame: u64) -> Self {
         Self {
             person: Person::new(track, place),
             unsure: Vec::new(),
@@ -137,6 +140,7 @@ impl Identity {
             is_new: true,
             reported: false,
             rivals: BTreeSet::new(),
+            unsure_since: frame,
         }
     }
 

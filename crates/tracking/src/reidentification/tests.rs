@@ -122,6 +122,51 @@ fn tracks_that_changed_over_change_their_numbers_back() {
     assert_eq!(scene.show(10, &frame(BLUE, RED), &apart), [2, 1], "and each stays");
 }
 
+/// Frames 1 to 30 are apart, 31 to 35 a contact; frames 36 and 37 show the two appearances that decide.
+#[test]
+fn ids_after_a_contact_are_in_doubt_until_they_are_put_right() {
+    let mut scene = Scene::new();
+    let apart = [track(1, 0.8, 1.6), track(2, -0.8, 1.6)];
+    let near = [track(1, 0.1, 1.6), track(2, -0.1, 1.6)];
+    let mut doubtful = Vec::new();
+    let mut corrections = Vec::new();
+    for index in 1..=40 {
+        let mut image = if index < 36 { frame(RED, BLUE) } else { frame(BLUE, RED) };
+        image.index = index;
+        let tracks = if (31..36).contains(&index) { &near } else { &apart };
+        let people = scene.stage.update(&image, &EgoMotion::at_rest(DT_S), tracks).unwrap();
+        let doubts = people.doubts.iter().map(|doubt| (doubt.track.0, doubt.others.clone()));
+        let doubts: Vec<_> = doubts.collect();
+        if !doubts.is_empty() {
+            assert_eq!(doubts, [(1, vec![TrackId(2)]), (2, vec![TrackId(1)])], "frame {index}");
+            doubtful.push(index);
+        }
+        corrections.extend(people.corrections.into_iter().map(|correction| (index, correction)));
+    }
+    assert_eq!(doubtful, [31, 32, 33, 34, 35, 36]);
+    let ids = [TrackId(1), TrackId(2)];
+    assert_eq!(corrections, [(37, IdentityCorrection { since: 36, ids })]);
+}
+
+/// The track is reported before its appearance counts, because another person is near to it.
+#[test]
+fn the_id_before_a_recognition_is_put_right() {
+    let mut scene = Scene::new();
+    let red = frame(RED, BLUE);
+    scene.show(30, &red, &[track(1, 0.8, 1.6)]);
+    scene.show(50, &red, &[]);
+    let beside = track(3, 0.5, 1.6);
+    let mut image = red;
+    image.index = 81;
+    assert_eq!(scene.show(3, &image, &[track(2, 0.8, 1.6), beside]), [2, 3]);
+    image.index = 84;
+    let people =
+        scene.stage.update(&image, &EgoMotion::at_rest(DT_S), &[track(2, 0.8, 1.6)]).unwrap();
+    assert_eq!(people.given_up, [TrackId(2)]);
+    let ids = [TrackId(2), TrackId(1)];
+    assert_eq!(people.corrections, [IdentityCorrection { since: 81, ids }]);
+}
+
 /// After the contact both tracks look like person 2, track 1 less so: an exchange would be right for
 /// one of them, and wrong for the other by more.
 #[test]

@@ -1,6 +1,6 @@
 //! Events of a run: people that appear, are lost, and come back.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::page::data::EventData;
 use crate::page::moment::Moment;
@@ -51,6 +51,8 @@ pub struct Watch {
     courses: BTreeMap<u32, Course>,
     target: Option<u32>,
     lock: Option<String>,
+    /// Tracks that may have changed over with others.
+    doubtful: BTreeSet<u32>,
     /// Times at which each cause of a stop or of a lower speed held last, s.
     causes: BTreeMap<String, f64>,
     /// True if the robot stood and did not drive since then.
@@ -78,8 +80,27 @@ impl Watch {
             };
             self.tell(at, "target", moment.target, text);
         }
+        self.compare_doubts(at, moment);
         self.compare_lock(at, moment);
         self.compare_motion(at, t_s, moment);
+    }
+
+    /// Tells which tracks may have changed over, once while that lasts, and which of them did.
+    fn compare_doubts(&mut self, at: usize, moment: &Moment) {
+        let doubts = &moment.notes.doubts;
+        let before = std::mem::take(&mut self.doubtful);
+        self.doubtful = doubts.iter().map(|doubt| doubt.id).collect();
+        for doubt in doubts.iter().filter(|doubt| !before.contains(&doubt.id)) {
+            let others: Vec<String> = doubt.others.iter().map(u32::to_string).collect();
+            let text = format!("person {} may be person {}", doubt.id, others.join(" or "));
+            self.tell(at, "doubt", Some(doubt.id), text);
+        }
+        for correction in &moment.notes.corrections {
+            let [id, other] = correction.ids;
+            let since = correction.since;
+            let text = format!("{id} and {other} were the wrong way round from frame {since} on");
+            self.tell(at, "corrected", Some(other), text);
+        }
     }
 
     /// Tells a change of the target lock's state with its cause.
@@ -164,7 +185,7 @@ impl Watch {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_app::frame_notes::DriveNote;
+    use tagalong_app::frame_notes::{CorrectionNote, DoubtNote, DriveNote};
 
     use super::*;
     use crate::page::moment::TrackState;
@@ -243,6 +264,27 @@ mod tests {
         let told = of_run(&[0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6], &all);
         let kinds: Vec<_> = told.iter().map(|event| (event.i, event.kind)).collect();
         assert_eq!(kinds, [(1, "slower"), (4, "stands"), (5, "stands"), (6, "drives")]);
+    }
+
+    #[test]
+    fn a_doubt_is_told_once_while_it_lasts_and_a_correction_with_it() {
+        fn of(in_doubt: bool) -> Moment {
+            let mut moment = moment(&[]);
+            let doubt = DoubtNote { id: 3, others: vec![4, 7] };
+            moment.notes.doubts = if in_doubt { vec![doubt] } else { Vec::new() };
+            moment
+        }
+
+        let mut last = of(false);
+        last.notes.corrections = vec![CorrectionNote { since: 9, ids: [3, 4] }];
+        let moments = [of(true), of(true), of(false), of(true), last];
+        let all: Vec<Option<&Moment>> = moments.iter().map(Some).collect();
+        let told = of_run(&[0.0, 0.1, 0.2, 0.3, 0.4], &all);
+        let told: Vec<_> =
+            told.iter().map(|event| (event.i, event.kind, event.text.as_str())).collect();
+        let doubt = "person 3 may be person 4 or 7";
+        let corrected = "3 and 4 were the wrong way round from frame 9 on";
+        assert_eq!(told, [(0, "doubt", doubt), (3, "doubt", doubt), (4, "corrected", corrected)]);
     }
 
     #[test]

@@ -715,7 +715,7 @@
 
   const events = data.runs.flatMap((run, number) => run.events.map((event) => ({ ...event, t: data.t[event.i], run: number })))
     .sort((a, b) => a.i - b.i || a.run - b.run);
-  const SIGNS = { started: "●", lost: "○", found: "◐", ended: "■", recognised: "↺", target: "◎", lock: "◆", drives: "▶", slower: "▽", stands: "▮", missed: "✕", switched: "⇄", "wrong person": "≠", "false track": "△" };
+  const SIGNS = { started: "●", lost: "○", found: "◐", ended: "■", recognised: "↺", doubt: "?", corrected: "↹", target: "◎", lock: "◆", drives: "▶", slower: "▽", stands: "▮", missed: "✕", switched: "⇄", "wrong person": "≠", "false track": "△" };
   const BAD = ["missed", "switched", "wrong person", "false track"];
   const hiddenKinds = new Set();
   const knownKinds = new Set();
