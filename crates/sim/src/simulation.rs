@@ -39,6 +39,7 @@ mod injector;
 mod joints;
 mod nearness;
 mod sensing;
+mod sight;
 mod walkers;
 
 pub use in_sight::CrowdView;
@@ -46,6 +47,7 @@ use injector::Injector;
 pub use joints::Joint;
 use joints::{Spot, joints};
 use sensing::Sensing;
+use sight::sight;
 use walkers::{approaching_person, walkers};
 
 /// People, robot and odometry move in steps of this many nanoseconds.
@@ -650,33 +652,6 @@ impl Simulation {
         });
         truth.collect()
     }
-}
-
-/// Returns how the upper body of a person appears: the region where it must be, and the visible
-/// part of it.
-fn sight(
-    view: &WorldCamera<'_>,
-    seen: &HitImage,
-    of: (u16, &[Shape]),
-    skeleton: &Skeleton,
-) -> (Option<Rect>, Visibility) {
-    let camera = view.camera;
-    let square =
-        |pose: Isometry3<f64>| camera.upper_body(&pose.inverse_transform_point(&skeleton.head));
-    let whole = square(view.pose_at(square((view.pose)(0.5)).centre().y));
-    let clipped = whole.clipped(camera.width, camera.height);
-    if clipped.width < 2.0 || clipped.height < 2.0 {
-        return (None, Visibility::default());
-    }
-    let mut visibility = view.visibility(seen, of, pixels(&clipped));
-    // The part of the square outside of the image counts as not visible.
-    visibility.fraction *= clipped.area() / whole.area();
-    (Some(clipped), visibility)
-}
-
-/// Left, top, right, bottom.
-fn pixels(area: &Rect) -> [usize; 4] {
-    [area.x as usize, area.y as usize, area.right() as usize, area.bottom() as usize]
 }
 
 fn camera(scene: &Scene) -> Camera {
