@@ -12,7 +12,7 @@ use tagalong_view::Live;
 use crate::diagnostics::{Diagnostics, Status};
 use crate::inbox::{Arrival, Inbox};
 use crate::messages::SpeedLimit;
-use crate::nav2::{self, Follower};
+use crate::nav2::{Follower, ends_goal};
 use crate::network::{Ear, Network};
 use crate::options::Setup;
 use crate::publishers::{Gate, Origin};
@@ -423,7 +423,7 @@ impl Bridge {
         let status = self.pipeline.status();
         if let Some(follower) = &self.follower {
             let follows = status.as_ref().is_some_and(|status| status.follows);
-            let stands = report.command.is_some_and(|command| nav2::stops(command.reason));
+            let stands = report.command.is_some_and(|command| ends_goal(command.reason));
             let is_well = !found.odom_stale && self.pipeline.fault().is_none();
             follower.note_frame(follows && is_well && !stands);
         }

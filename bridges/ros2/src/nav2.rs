@@ -36,7 +36,7 @@ const LAST_WAIT: Duration = Duration::from_secs(2);
 
 /// Returns true for a stop of the pipeline that ends the goal: what would stop its own commands stops
 /// those of the server, too. To have no target yet, or to have just begun, is no danger.
-pub(crate) fn stops(reason: Reason) -> bool {
+pub(crate) fn ends_goal(reason: Reason) -> bool {
     !reason.moves() && !matches!(reason, Reason::NoTarget | Reason::Settling)
 }
 
@@ -439,12 +439,12 @@ mod tests {
         for reason in
             [Reason::Blocked, Reason::TooClose, Reason::Frozen, Reason::Contact, Reason::Silent]
         {
-            assert!(stops(reason), "{reason}");
+            assert!(ends_goal(reason), "{reason}");
         }
         for reason in
             [Reason::Follow, Reason::Near, Reason::Slow, Reason::NoTarget, Reason::Settling]
         {
-            assert!(!stops(reason), "{reason}");
+            assert!(!ends_goal(reason), "{reason}");
         }
     }
 }
