@@ -120,19 +120,13 @@ mod tests {
         // Five rays of a quarter turn from right to left, behind a blind camera: the first ends at 2 m,
         // nothing comes back from the middle one, and the others say nothing.
         let robot_from_scanner = Isometry3::translation(0.0, 0.0, 0.2);
-        let scan = LaserScan {
-            stamp: None,
-            robot_from_scanner,
-            first_rad: -TAU / 4.0,
-            increment_rad: TAU / 8.0,
-            points: vec![Point3::new(0.0, -2.0, 0.2)].into(),
-            rays: vec![0].into(),
-            unread: vec![
-                UnreadRay { ray: 2, reading: RayReading::NoReturn },
-                UnreadRay { ray: 3, reading: RayReading::Invalid },
-            ]
-            .into(),
-        };
+        let unread = [(2, RayReading::NoReturn), (3, RayReading::Invalid)];
+        let unread: Vec<UnreadRay> =
+            unread.into_iter().map(|(ray, reading)| UnreadRay { ray, reading }).collect();
+        let scan = LaserScan::of_points(vec![Point3::new(0.0, -2.0, 0.2)])
+            .with_scanner(robot_from_scanner)
+            .with_rays(-TAU / 4.0, TAU / 8.0, vec![0])
+            .with_unread(unread);
         let camera = Arc::new(Camera::blind(robot_from_scanner));
         let motion = EgoMotion::at_rest(0.1);
         let frame = Frame::new(1, Stamp::default(), camera, motion, Images::default());
