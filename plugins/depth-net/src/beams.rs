@@ -215,8 +215,8 @@ mod tests {
             let [left_deg, above_deg] = off_deg;
             let both = [[left_deg, above_deg, 2.0], [0.45, 1.1, 3.0]];
             for points in [both, [both[1], both[0]]] {
-                let points = points.map(beam).to_vec().into();
-                let beams = Beams::new(&PointCloud { scanner: Point3::origin(), points });
+                let points = points.map(beam).to_vec();
+                let beams = Beams::new(&PointCloud::new(Point3::origin(), points));
                 let range_m = beams.range_m(&beam([0.6, 0.7, 9.0])).unwrap();
                 assert!((range_m - 3.0).abs() < 1e-6, "{off_deg:?}: {range_m}");
             }

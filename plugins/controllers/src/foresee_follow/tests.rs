@@ -74,13 +74,7 @@ fn ride(config: &Config, world: &World, seconds: f64) -> Vec<Moment> {
             .collect();
         let frame = Frame::new(1, Stamp::default(), Arc::clone(&camera), motion, Images::default())
             .with_laser(Some(LaserScan::of_points(points)));
-        let scene = Scene {
-            frame: &frame,
-            target: Some(&tracks[0]),
-            tracks: &tracks,
-            wheels: WHEELS,
-            max_speed_mps: MAX_MPS,
-        };
+        let scene = Scene::new(&frame, &tracks, WHEELS, MAX_MPS).with_target(Some(&tracks[0]));
         let twist = controller.command(&scene);
         let WheelSpeeds { left, right } = WHEELS.wheels_within(twist, MAX_MPS);
         motion = EgoMotion::from_wheels(left, right, &WHEELS, DT_S);
