@@ -88,7 +88,7 @@ pub(crate) struct Callers {
     pub(crate) requests: Receiver<Request>,
 }
 
-/// What outlives a bridge, for the next one.
+/// State that outlives a bridge, for the next one.
 pub(crate) struct Surroundings {
     pub(crate) network: Network,
     pub(crate) inbox: Arc<Inbox>,

@@ -95,7 +95,7 @@ impl Forecast {
         Self { settings, last: None }
     }
 
-    /// Returns the grid of a frame; `None` so soon after the last one that nobody needs it.
+    /// Returns the grid of a frame; `None` too soon after the last one to be of use.
     pub(crate) fn grid(&mut self, now: Now<'_>) -> Option<OccupancyGrid> {
         let stamp = now.frame.stamp;
         let is_soon = self.last.is_some_and(|last| {

@@ -126,7 +126,7 @@ pub(crate) struct Lifecycle {
     events: Publisher<TransitionEvent>,
 }
 
-/// What the threads of the services share.
+/// State that the threads of the services share.
 struct StateDesk {
     state: Mutex<NodeState>,
     /// Switch of the wheels, where there are some.

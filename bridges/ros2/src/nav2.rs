@@ -55,7 +55,7 @@ pub(crate) struct GoalReport {
     pub(crate) is_unconfirmed: bool,
 }
 
-/// What the thread and its owner share.
+/// State that the thread and its owner share.
 #[derive(Default)]
 struct Shared {
     /// True once the server is gone from the network.

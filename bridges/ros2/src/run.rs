@@ -107,7 +107,7 @@ fn serve(
     Ok(live)
 }
 
-/// What the node has in its state.
+/// Parts of the node in its state.
 enum Body {
     /// Nothing but its place on the network.
     Bare(Surroundings),

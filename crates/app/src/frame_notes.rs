@@ -47,7 +47,7 @@ pub struct FrameNotes {
 pub struct DoubtNote {
     /// ID of the track.
     pub id: u32,
-    /// IDs of the people with whom it may have changed over.
+    /// IDs of the other people in question.
     pub others: Vec<u32>,
 }
 

@@ -25,7 +25,7 @@ pub struct AnnotatedPerson {
 }
 
 impl AnnotatedPerson {
-    /// Creates a person at a centre of the head in the robot frame, m, who counts and is all visible.
+    /// Creates a person at a centre of the head in the robot frame, m, that counts and is all visible.
     pub fn new(head: Point3<f64>) -> Self {
         Self { head, counts: true, visible: 1.0 }
     }

@@ -259,7 +259,7 @@ impl Capabilities {
         Self { inputs, ..Self::default() }
     }
 
-    /// Returns the declaration of a detector that finds people who are not tracked yet.
+    /// Returns the declaration of a detector that finds people without a track.
     pub fn discovering(self) -> Self {
         Self { discovers: true, ..self }
     }

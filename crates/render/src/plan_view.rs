@@ -184,7 +184,7 @@ fn draw_track(canvas: &mut Canvas, plan: &Plan, track: &Track, target: bool) {
     canvas.line(at, plan.pixel(soon.x, soon.y), ink.faint(opacity));
 }
 
-/// Renders the mark of a person who is predicted.
+/// Renders the mark of a predicted person.
 pub(super) fn draw_ring(canvas: &mut Canvas, at: Point2<f64>, radius: f64, ink: Ink) {
     canvas.disc(at, radius, ink);
     canvas.disc(at, radius - 2.0, GROUND);

@@ -59,7 +59,7 @@ fn main() {
     }
 }
 
-/// What the fastest rounds took, and the digest of the images.
+/// Times of the fastest rounds, and the digest of the images.
 struct Rate {
     processor_ms: f64,
     per_s: f64,

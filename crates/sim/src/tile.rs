@@ -73,7 +73,7 @@ pub struct Batch {
     pub count: usize,
     /// The rays.
     pub rays: Vectors,
-    /// Where they meet the solid.
+    /// Points where they meet the solid.
     pub points: Vectors,
     /// After so many lengths of the rays.
     pub t: Lanes,

@@ -101,12 +101,12 @@ impl Outcome {
 pub struct IdentityDoubt {
     /// ID of the track.
     pub track: TrackId,
-    /// IDs of the people with whom it may have changed over, rising.
+    /// IDs of the other people in question, rising.
     pub others: Vec<TrackId>,
 }
 
-/// Two IDs that were reported the wrong way round for a while. One of them may belong to nobody in
-/// these frames: a person who was recognised some frames after the start of a track.
+/// Two IDs that were reported the wrong way round for a while. One of them may belong to no
+/// person of these frames, if a person was recognised some frames after the start of a track.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct IdentityCorrection {
     /// Index of the first frame in which they are wrong; the frame of the report is right.

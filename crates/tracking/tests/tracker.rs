@@ -200,7 +200,7 @@ fn a_frame_on_which_the_detector_does_not_run_is_no_miss() {
     assert_eq!(script.asked(), [(2, None), (6, None)]);
 }
 
-/// The other detector runs on each frame and finds nobody.
+/// The other detector runs on each frame and finds no person.
 #[test]
 fn the_silence_of_a_detector_is_no_miss_of_the_tracks_of_another() {
     let script = Script::of([person(3.0, 0.0)]);
@@ -559,7 +559,7 @@ fn a_half_hidden_person_may_stand_aside() {
     assert_eq!(across(0.8, false), behind, "who was missed hides others all the same");
 }
 
-/// Two misses end a new track; the filter finds nobody in a frame 3.
+/// Two misses end a new track; the filter finds no person in a frame 3.
 #[test]
 fn a_filter_that_searches_misses_tracks_where_no_detector_ran() {
     let script = Script::of([person(3.0, 0.0)]);

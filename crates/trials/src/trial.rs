@@ -143,7 +143,7 @@ impl Trial {
     }
 }
 
-/// Returns the scene without colour images where nobody looks at them: they take more than half of the
+/// Returns the scene without colour images where no pipeline uses them: they take more than half of the
 /// time of an image with depth, and change nothing else.
 pub(crate) fn without_unused_colour(scene: &Scene, inputs: Inputs, are_images_used: bool) -> Scene {
     let mut scene = scene.clone();

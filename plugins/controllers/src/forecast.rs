@@ -34,7 +34,7 @@ pub struct ForecastSettings {
     /// Rate at which a velocity decays, 1/s; 0 for a constant velocity.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub damping_per_s: f64,
-    /// Spectral density of the acceleration of a person who stands, m²/s³.
+    /// Spectral density of the acceleration of a standing person, m²/s³.
     #[schemars(range(min = 0.0, max = 1e3))]
     pub unrest: f64,
     /// Additional spectral density for each (m/s)² of the speed, 1/s.
@@ -364,7 +364,7 @@ mod tests {
     }
 
     proptest! {
-        /// What the robot turns away from is to its side, with the ellipse.
+        /// A person ahead is to the side of the turned robot, with the ellipse.
         #[test]
         fn a_robot_that_moves_sees_the_same_world(
             forward in -1.0..1.0, left in -1.0..1.0, turn in -3.0..3.0, seconds in 0.0..4.0,

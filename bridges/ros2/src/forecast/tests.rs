@@ -60,7 +60,7 @@ fn a_person_is_occupied_the_rest_of_the_view_free_and_what_is_outside_unknown() 
     assert!((20..100).contains(&value(&grid, 3.45, 1.05)), "{}", value(&grid, 3.45, 1.05));
     assert_eq!(value(&grid, 3.05, -1.05), 0);
     assert_eq!(value(&grid, -3.05, 1.05), UNKNOWN);
-    // A person who walks out of the view is known there.
+    // A person on the way out of the view is known there.
     let leaving = [person([0.5, 0.0], [-1.0, 0.0], [0.05, 0.1])];
     assert!(value(&made(&SETTINGS, &leaving, Isometry2::identity()), -1.05, 0.05) > 10);
     assert!((-1..=100).contains(&grid.data.iter().copied().min().unwrap()));
@@ -93,7 +93,7 @@ fn uncertain_velocity_spreads_with_time() {
     assert_eq!(beside(&certain), 0);
     assert!(beside(&uncertain) >= 2, "{}", beside(&uncertain));
     assert!(value(&uncertain, 3.55, 0.05) + 20 < value(&certain, 3.55, 0.05));
-    // A person on the left who walks to the left is farther to the left later: more spread.
+    // A person on the left that walks to the left is farther to the left later: more spread.
     let coupled = |covariance| {
         let mut track = person([0.5, 0.0], [1.0, 0.0], [0.3, 0.4]);
         track.estimate.covariance[(1, 4)] = covariance;

@@ -60,7 +60,7 @@ const IS_DEAF: u8 = 3;
 /// It sends no feedback.
 const IS_SILENT: u8 = 4;
 
-/// What happened at the server.
+/// Events at the server.
 #[derive(Clone, Debug, PartialEq)]
 enum Happened {
     Goal(String),

@@ -341,7 +341,7 @@ fn a_person_who_walked_away_is_not_back_at_once() {
     assert_eq!(number_of_next(1.5, 40), 1, "it has had the time");
 }
 
-/// What the track looks like shows only after a while.
+/// The appearance of the track shows only after a while.
 #[test]
 fn a_track_takes_over_a_number_soon_after_its_start_or_never() {
     fn number_after(hidden_frames: usize) -> u32 {

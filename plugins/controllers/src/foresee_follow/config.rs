@@ -12,7 +12,7 @@ pub(super) const MOST: f64 = 1e6;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Side {
-    /// Behind the person, whom it faces.
+    /// Behind the person, facing them.
     #[default]
     Behind,
     /// At the left of the person.

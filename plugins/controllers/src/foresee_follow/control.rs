@@ -11,7 +11,7 @@ use crate::{CommandHistory, Forecast, coasting_weight, step_s};
 const PERSON_M: f64 = 0.45;
 /// Speed from which on a person walks, and has a direction, m/s.
 const WALKS_MPS: f64 = 0.3;
-/// Time in which the direction of a person who walks follows the velocity, s.
+/// Time in which the direction of a walking person follows the velocity, s.
 const HEADING_S: f64 = 0.5;
 /// Speed above the measured one that the wheels may have reached meanwhile, m/s.
 const AHEAD_MPS: f64 = 0.1;
@@ -24,7 +24,7 @@ pub struct ForeseeFollow {
     scenery: Scenery,
     planner: Planner,
     /// Direction in which the person walks or last walked, in the axes of the robot; `None` for a
-    /// person who has not walked yet.
+    /// person before the first step.
     heading: Option<Vector2<f64>>,
     /// The forward speed of the last command, m/s.
     speed_mps: f64,

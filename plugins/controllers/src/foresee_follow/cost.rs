@@ -175,7 +175,7 @@ mod tests {
 
     const STEP: usize = 4;
 
-    /// A person who stands 3 m ahead.
+    /// A standing person 3 m ahead.
     fn scenery() -> Scenery {
         let mut scenery = Scenery::new(4.0);
         scenery.set_person(&stands(3.0, 0.0));
@@ -207,7 +207,7 @@ mod tests {
         near(added(&free, Goal::Facing, [0.6, 0.0, 0.0], 0.5), 1.0 / 20.0);
         near(added(&free, Goal::Facing, [1.6, 0.0, 1.5], 0.5), 0.5 / 20.0);
         let walks = Scenery { heading: Some(Vector2::y()), ..scenery() };
-        // Its place is 1.4 m to the left of the person, who looks to the left of the robot.
+        // Its place is 1.4 m to the left of the person, and the person looks to the left of the robot.
         let left = Goal::Beside(90_f64.to_radians());
         near(added(&walks, left, [1.6, 0.0, 0.3], 0.5), 0.0);
         near(added(&walks, left, [1.6, 2.0, 0.3], 0.5), 2.0 / 20.0);
@@ -222,7 +222,7 @@ mod tests {
         near(added(&tight, Goal::Facing, [1.6, 0.0, 0.0], 0.0), 0.0);
         tight.things.push(Point2::new(1.6, 0.0));
         near(added(&tight, Goal::Facing, [1.6, 0.0, 0.0], 0.5), 2.0 * 4.0);
-        // 0.74 m from a person who wants 0.84 m.
+        // 0.74 m from a person, where 0.84 m are wanted.
         let person = added(&scenery(), Goal::Facing, [2.26, 0.0, 0.0], 0.5);
         near(person, 0.66 / 20.0 + 2.0 * 0.25);
         near(weight(1.5, &tight), 1.0);

@@ -17,7 +17,7 @@ const STILL_MPS: f64 = 0.05;
 /// Place at which a robot wants to be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Goal {
-    /// So far from the person, whom the robot faces.
+    /// So far from the person, with the robot facing them.
     Facing,
     /// At an angle from the direction in which the person walks, rad.
     Beside(f64),

@@ -95,7 +95,7 @@ fn nearest_m(from: Point2<f64>, places: impl Iterator<Item = Point2<f64>>) -> f6
     places.map(|at| (at - from).norm()).fold(f64::INFINITY, f64::min)
 }
 
-/// Returns the distance of the robot from its place beside a person who walks along X, m.
+/// Returns the distance of the robot from its place beside a person that walks along X, m.
 fn off_m(moment: &Moment, angle_deg: f64, stand_off_m: f64) -> f64 {
     let person = moment.pose * moment.seen;
     let angle = angle_deg.to_radians();
