@@ -5,7 +5,7 @@
 //! uncertainty of the state is a part of that of the filter of the track. Most people go on as they do,
 //! and few turn round, so that the place has long tails: it is distributed as Student's t, with ever
 //! fewer degrees of freedom. All settings are learnt from simulated walks by `cargo run --release -p
-//! tagalong-controllers --example forecast`, which prints how many true places lie within the ellipses
+//! tagalong-benches --example forecast`, which prints how many true places lie within the ellipses
 //! on walks that they were not learnt from.
 
 use nalgebra::{Matrix2, Matrix4, Point2, Vector2};

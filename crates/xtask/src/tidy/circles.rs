@@ -51,9 +51,9 @@ pub fn check(workspace: &Workspace) -> Result<Vec<String>> {
 fn place(file: &str) -> Option<(&str, Names)> {
     let (folder, rest) = file.split_once("/src/")?;
     let module = rest.strip_suffix(".rs")?;
-    let is_ours = ["crates/", "plugins/", "benches/"].iter().any(|part| folder.starts_with(part));
+    let in_product = folder.starts_with("crates/") || folder.starts_with("plugins/");
     let mut names: Names = module.split('/').map(String::from).collect();
-    if !is_ours || names[0] == "bin" || names.iter().any(|name| name == "tests") {
+    if !in_product || names[0] == "bin" || names.iter().any(|name| name == "tests") {
         return None;
     }
     if names.last().is_some_and(|name| ["lib", "main", "mod"].contains(&name.as_str())) {

@@ -24,6 +24,9 @@ const LIST: &str = "docs/reference/config-keys.md";
 /// Plugins that are described on the page of another one of their crate.
 const DESCRIBED_WITH: &[(&str, &str)] = &[("depth-net-verifier", "depth-net")];
 
+/// Folders of configs: those of the laboratory try plugins that no config for users recommends yet.
+const CONFIGS: &[&str] = &["configs", "benches/papers/configs"];
+
 /// Plugins that a config has without naming them.
 const DEFAULTS: &[&str] = &["associate-hungarian", "manage-m-of-n"];
 
@@ -54,7 +57,9 @@ pub fn check(workspace: &Workspace, metadata: &Metadata) -> Result<Vec<String>> 
     let pages = pages(workspace)?;
     for name in registered(workspace)? {
         if !used.contains(&name) && !DEFAULTS.contains(&name.as_str()) {
-            complaints.push(format!("no config in configs/ uses the plugin `{name}`"));
+            complaints.push(format!(
+                "no config in configs/ or benches/papers/configs/ uses the plugin `{name}`"
+            ));
         }
         match pages.get(page_of(&name)) {
             Some((file, text)) => {
@@ -132,7 +137,8 @@ fn gaps(readme: &str) -> Vec<String> {
 fn used_plugins(workspace: &Workspace) -> Result<BTreeSet<String>> {
     let mut used = BTreeSet::new();
     for file in workspace.files()? {
-        if file.starts_with("configs") && file.extension().is_some_and(|e| e == "toml") {
+        let is_config = CONFIGS.iter().any(|folder| file.starts_with(folder));
+        if is_config && file.extension().is_some_and(|e| e == "toml") {
             let table: toml::Table = toml::from_str(&workspace.read(&file)?)
                 .with_context(|| format!("{} is no TOML", file.display()))?;
             collect_plugins(&toml::Value::Table(table), &mut used);

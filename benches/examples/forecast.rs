@@ -2,7 +2,7 @@
 //! true places lie within its ellipses on walks of the split `test`.
 //!
 //! ```text
-//! cargo run --release -p tagalong-controllers --example forecast
+//! cargo run --release -p tagalong-benches --example forecast
 //! ```
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "an example")]
 
