@@ -60,7 +60,7 @@ pub fn samples(split: Split, seeds: u64) -> Vec<Sample> {
         for number in 0..seeds {
             let mut variant = Variant::of_split(split, number).with("duration_s", 24.0);
             for (key, value) in values {
-                variant = variant.with(*key, *value);
+                variant = variant.with(key, *value);
             }
             let scene = Scene::parse_with(CAMERA, &variant).expect("the scene is a valid one");
             add_walks(&scene, &mut samples);
