@@ -18,13 +18,15 @@ pub(super) struct Quarry {
 }
 
 impl Quarry {
-    /// Returns the person of this frame, or the one before moved along with the robot.
+    /// Returns the person of this frame, or, while their track lives on, where they were seen last, moved
+    /// along with the robot. `None` without a target: the search of the config comes then.
     pub(super) fn next(before: Option<Self>, scene: &Scene<'_>) -> Option<Self> {
         fn is_finite(place: &Point2<f64>, velocity: &Vector2<f64>) -> bool {
             place.iter().chain(velocity.iter()).all(|value| value.abs() < MOST)
         }
 
-        if let Some(track) = scene.target.filter(|track| track.seen) {
+        let track = scene.target?;
+        if track.seen {
             let person = &track.estimate.person;
             let place = person.position.xy();
             if is_finite(&place, &person.velocity) {
