@@ -283,6 +283,14 @@ mod tests {
         Wheels::start(Duration::from_millis(5), switch, Stamp::default, tell).unwrap()
     }
 
+    /// Waits until so many commands were sent since a time: threads of a busy machine are late.
+    fn wait_for(tape: &Tape, since: Instant, count: usize) {
+        let end = Instant::now() + Duration::from_secs(5);
+        while told_since(tape, since).len() < count && Instant::now() < end {
+            thread::sleep(Duration::from_millis(5));
+        }
+    }
+
     fn enable(wheels: &Wheels) {
         let switch = wheels.switch();
         [Enable::Reset, Enable::On].into_iter().for_each(|event| switch.take(event, switch.now()));
@@ -392,6 +400,7 @@ mod tests {
         assert!(tape.lock().unwrap().is_empty(), "the other one drives");
         let halted = Instant::now();
         switch.halt("deactivated");
+        wait_for(&tape, halted, FAREWELLS as usize);
         thread::sleep(Duration::from_millis(100));
         assert!(told_since(&tape, halted).len() >= FAREWELLS as usize, "a stop after its drive");
         let silent = Instant::now();
@@ -403,14 +412,14 @@ mod tests {
         wheels.obey(None);
         let released = Instant::now();
         switch.take(Enable::Off, switch.now());
-        thread::sleep(Duration::from_millis(40));
+        wait_for(&tape, released, 4);
         assert!(told_since(&tape, released).len() > 3, "a stop");
         thread::sleep(Duration::from_secs_f64(ZEROS_S + 0.2));
         let left = Instant::now();
         thread::sleep(Duration::from_millis(40));
         assert!(told_since(&tape, left).is_empty(), "the other one has stopped");
         switch.set_driver(Driver::Unconfirmed);
-        thread::sleep(Duration::from_millis(40));
+        wait_for(&tape, left, 4);
         assert!(told_since(&tape, left).len() > 3, "the other one does not confirm its stop");
         drop(wheels);
     }
