@@ -135,6 +135,7 @@ fn a_manager_leads_the_node_and_what_ends_its_work_stops_the_robot() {
     let hand = Hand::new(domain(14), &stop);
     let ends = Arc::clone(&stop);
     let playing = thread::spawn(move || {
+        robot.start_now();
         robot.play_while(simulation, &|_| !ends.load(Ordering::Relaxed));
         robot
     });
@@ -234,6 +235,7 @@ fn a_stuck_pipeline_is_deactivated_at_once() {
     let hand = Hand::new(domain(15), &stop);
     let ends = Arc::clone(&stop);
     let playing = thread::spawn(move || {
+        robot.start_now();
         robot.play_while(simulation, &|_| !ends.load(Ordering::Relaxed));
         robot
     });

@@ -345,6 +345,12 @@ pub(crate) enum Repeats {
     Pictures,
 }
 
+/// Returns the time of the clock of the machine.
+fn now() -> Stamp {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap();
+    Stamp::from_nanos(since.as_nanos() as u64)
+}
+
 /// Topics of a simulated robot.
 pub(crate) struct Robot {
     pub(crate) peer: Peer,
@@ -366,7 +372,6 @@ impl Robot {
     pub(crate) fn new(domain: u16, camera: &Camera) -> Self {
         let mut peer = Peer::join(domain, "robot");
         let latched = reliable().durability(Durability::TransientLocal);
-        let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap();
         Self {
             colour: peer.publisher("/camera/color/image_raw", sensor()),
             depth: peer.publisher("/camera/aligned_depth_to_color/image_raw", sensor()),
@@ -375,10 +380,15 @@ impl Robot {
             fixed: peer.publisher("/tf_static", latched),
             peer,
             camera: camera.clone(),
-            epoch: Stamp::from_nanos(since.as_nanos() as u64),
+            epoch: now(),
             zoomed: Arc::default(),
             repeats: Arc::default(),
         }
+    }
+
+    /// Lets the scene start now, after a wait for other nodes: old frames move nothing.
+    pub(crate) fn start_now(&mut self) {
+        self.epoch = now();
     }
 
     /// Publishes a scene in real time; returns the time of the last image.
