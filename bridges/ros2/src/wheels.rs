@@ -233,7 +233,8 @@ impl Shared {
         // True if the robot was driven since the last farewell.
         let mut has_driven = false;
         while let Some(state) = self.wait(period) {
-            has_driven |= state.driver == Driver::Other;
+            // Not while it is halted: the farewell is said once.
+            has_driven |= state.is_active && state.driver == Driver::Other;
             if let Some(wheels) = state.command(now(), self.started.elapsed()) {
                 told.count(wheels);
                 tell(wheels);
