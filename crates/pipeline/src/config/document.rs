@@ -111,7 +111,7 @@ impl Document {
     /// Returns the config with everything that it inherits, without places.
     ///
     /// # Errors
-    /// As [`Document::root`].
+    /// None for a config that was read.
     pub fn table(&self) -> Result<toml::Table, ConfigError> {
         use serde::Deserialize;
         let whole = Spanned::new(0..0, DeValue::Table(self.root()?));
