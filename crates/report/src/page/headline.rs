@@ -121,7 +121,7 @@ impl Page<'_> {
         let most = all.iter().map(|e| e.logs).max().unwrap_or(0);
         // One picture per row is enough: that of the ranking figure.
         let picture = (figure.name == MAIN.name)
-            .then(|| interval(estimate.mean, estimate.interval, range(&all)));
+            .then(|| interval(estimate.mean, shown_interval(estimate), range(&all)));
         cell(
             estimate.mean,
             &html! {
@@ -129,7 +129,7 @@ impl Page<'_> {
                     @if estimate.best { "★ " } (number(estimate.mean, figure.decimals))
                     @if estimate.best { span class="unseen" { " best" } }
                 }
-                @if let Some(ends) = estimate.interval.filter(|ends| informs(ends, figure.range)) {
+                @if let Some(ends) = shown_interval(estimate).filter(|ends| informs(ends, figure.range)) {
                     " " (ends_of(ends, figure.decimals))
                 }
                 @if estimate.logs < most { span class="fewer" { (counted(estimate.logs, "log")) " only" } }
@@ -234,6 +234,15 @@ const SHARE: [f64; 2] = [0.0, 1.0];
 /// a cell.
 const LEAST_INFORMATION: f64 = 0.05;
 
+/// Least number of logs of which the interval of a mean is shown: that of two logs is 25 times as wide as
+/// its standard error, and hides the figures beside it.
+const LEAST_LOGS: u64 = 3;
+
+/// Returns the interval of a mean over enough logs.
+fn shown_interval(estimate: &Estimate) -> Option<[f64; 2]> {
+    estimate.interval.filter(|_| estimate.logs >= LEAST_LOGS)
+}
+
 /// Returns false for an interval that covers nearly all values that a figure of this range can have.
 /// One of a range without an end, as of a count, always leaves out some.
 fn informs(ends: &[f64; 2], [least, most]: [f64; 2]) -> bool {
@@ -268,8 +277,9 @@ fn p_equals(p: f64) -> String {
 
 /// Returns the range from the lowest to the highest end of all, including zero.
 fn range(all: &[&Estimate]) -> [f64; 2] {
-    let ends =
-        all.iter().flat_map(|e| e.interval.unwrap_or([e.mean, e.mean]).into_iter().chain([e.mean]));
+    let ends = all
+        .iter()
+        .flat_map(|e| shown_interval(e).unwrap_or([e.mean, e.mean]).into_iter().chain([e.mean]));
     ends.fold([0.0, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)])
 }
 

@@ -15,6 +15,12 @@ use crate::summary::PairSummary;
 /// Most differences listed of all pairs together; the rest is counted.
 const MOST_LISTED: usize = 1200;
 
+/// Key of the figure that tells false reports.
+const FALSE_REPORTS: &str = "image.fp_per_frame";
+
+/// Least difference in false people per frame that is named: one in fifty frames.
+const LEAST_FALSE_REPORTS: f64 = 0.02;
+
 /// Most pipelines of which each pair is described; of more it is the best one against others.
 const ALL_PAIRS_OF: usize = 4;
 
@@ -46,8 +52,8 @@ impl Page<'_> {
         })
     }
 
-    /// Says in one line in what a pair differs: people found, and the test that costs the worse one
-    /// most.
+    /// Says in one line in what a pair differs: people found, the test that costs the worse one most, and
+    /// false reports.
     pub(super) fn why_of_pair(&self, a: &str, b: &str) -> Option<String> {
         let [mut better, mut worse] = [a, b].map(|name| {
             let found = self.summary.pipeline(name).and_then(|it| it.people_found_count());
@@ -58,10 +64,11 @@ impl Page<'_> {
             std::mem::swap(&mut better, &mut worse);
         }
         let people = self.summary.pipeline(worse.2)?.people;
-        let mut line = format!(
-            "{} found {} of {people} people, {} {}",
-            better.2, better.1?, worse.2, worse.1?
-        );
+        let mut line = if better.1? == worse.1? {
+            format!("Both found {} of {people} people", better.1?)
+        } else {
+            format!("{} found {} of {people} people, {} {}", better.2, better.1?, worse.2, worse.1?)
+        };
         let all: u64 = worse.0.values().sum();
         let costly = worse.0.iter().max_by_key(|(test, count)| (**count, std::cmp::Reverse(*test)));
         if let Some((test, count)) = costly {
@@ -72,7 +79,25 @@ impl Page<'_> {
             };
             line += &format!("; {why}");
         }
+        if let Some(false_reports) = self.false_reports_of_pair(better.2, worse.2) {
+            line += &format!("; {false_reports}");
+        }
         Some(line)
+    }
+
+    /// Says how many false people two pipelines report, the worse one first, if they differ in that.
+    fn false_reports_of_pair(&self, a: &str, b: &str) -> Option<String> {
+        let a = (self.false_per_frame(a)?, a);
+        let b = (self.false_per_frame(b)?, b);
+        let (more, fewer) = if a.0 > b.0 { (a, b) } else { (b, a) };
+        (more.0 - fewer.0 >= LEAST_FALSE_REPORTS).then(|| {
+            let [many, few] = [more.0, fewer.0].map(|rate| number(rate, 2));
+            format!("{} reports {many} false people per frame, {} {few}", more.1, fewer.1)
+        })
+    }
+
+    fn false_per_frame(&self, pipeline: &str) -> Option<f64> {
+        Some(self.summary.pipeline(pipeline)?.figures.get(FALSE_REPORTS)?.mean)
     }
 
     /// Returns the missed people in frames of a pipeline by test, over the runs that are drawn.
