@@ -454,6 +454,23 @@ fn a_mean_of_two_logs_shows_no_interval() {
 }
 
 #[test]
+fn a_pipeline_that_no_log_suits_has_no_row_and_its_reasons_are_listed() {
+    let mut benchmark = two_by_three();
+    let logs = ["hall", "lab", "yard"];
+    benchmark.tasks.extend(logs.map(|log| TaskResult {
+        pipeline: "stereo".into(),
+        log: log.into(),
+        outcome: Outcome::Skipped { why: "no right images".into() },
+        ..TaskResult::default()
+    }));
+    let page = html(&benchmark, None);
+    let results = &page[page.find("id=\"results\"").unwrap()..page.find("id=\"failed\"").unwrap()];
+    assert!(results.contains("1 pipeline that no log suits is left out"), "{results}");
+    assert!(!results.contains("stereo"));
+    assert_eq!(page.matches("no right images").count(), logs.len());
+}
+
+#[test]
 fn a_pipeline_that_finds_nobody_is_the_best_in_nothing() {
     let mut benchmark = two_by_three();
     let silent = benchmark.tasks[0].pipeline.clone();

@@ -2,7 +2,7 @@ use maud::{Markup, html};
 use tagalong_math::counted;
 
 use super::pairs::p_text;
-use super::{Page, cell, column, no_cell, number, table};
+use super::{Page, cell, column, no_cell, number, table, was_skipped};
 use crate::chart::{interval, key, series_class};
 use crate::figures::{ComparisonSpace, Figure, MAIN};
 use crate::model::copies_note;
@@ -15,10 +15,17 @@ impl Page<'_> {
         }
         let shown: Vec<ComparisonSpace> =
             ComparisonSpace::ALL.into_iter().filter(|p| self.has(*p)).collect();
+        let skipped = self.summary.pipelines.iter().filter(|p| was_skipped(p)).count();
         html! {
             @if let Some(verdict) = self.verdict() { p class="verdict" { (verdict) } }
             @if shown.is_empty() { p { "No task has been compared with a truth, so there are no figures." } }
             @for logs in self.view.copies { p class="bad" { (copies_note(logs)) "." } }
+            @if skipped > 0 {
+                p {
+                    (counted(skipped, "pipeline")) " that no log suits " (if skipped == 1 { "is" } else { "are" })
+                    " left out: " a href="#failed" { "the reasons" } "."
+                }
+            }
             @for place in shown {
                 h3 { (place_name(place)) }
                 (self.headline_table(place))
@@ -87,7 +94,7 @@ impl Page<'_> {
             @for figure in &figures { (figure_head(figure)) }
         };
         let body = html! {
-            @for summary in &self.summary.pipelines {
+            @for summary in self.summary.pipelines.iter().filter(|p| !was_skipped(p)) {
                 tr.(series_class(self.series(&summary.pipeline))) data-series=(self.series(&summary.pipeline)) {
                     th scope="row" { (key(self.series(&summary.pipeline), &summary.pipeline)) }
                     (done_cell(summary, most))
@@ -97,7 +104,9 @@ impl Page<'_> {
             }
         };
         let caption = html! {
-            "Means over logs, " (place_where(place)) ", with 95\u{a0}% intervals. "
+            "Means over logs, " (place_where(place))
+            @if self.view.logs.len() as u64 >= LEAST_LOGS { ", with 95\u{a0}% intervals" }
+            ". "
             span class="best" { "★ best" } " of the pipelines with the most logs."
         };
         table(&format!("Results {}", place_where(place)), &caption, &head, &body)
@@ -141,20 +150,23 @@ impl Page<'_> {
     /// Renders the main figure of each pipeline on each log.
     fn log_table(&self, place: ComparisonSpace) -> Markup {
         let columns: Vec<_> =
-            self.view.pipelines.iter().map(|p| (*p, per_log(&self.view, p, MAIN, place))).collect();
-        let logs =
-            self.view.logs.iter().filter(|log| columns.iter().any(|(_, v)| v.contains_key(*log)));
+            self.tried().map(|(rank, p)| (rank, p, per_log(&self.view, p, MAIN, place))).collect();
+        let logs = self
+            .view
+            .logs
+            .iter()
+            .filter(|log| columns.iter().any(|(_, _, v)| v.contains_key(*log)));
         let head = html! {
             (column("Log", None))
-            @for (rank, (name, _)) in columns.iter().enumerate() { (self.column_of(rank, name)) }
+            @for (rank, name, _) in &columns { (self.column_of(*rank, name)) }
         };
         let body = html! {
             @for log in logs {
-                @let known = columns.iter().filter_map(|(_, values)| values.get(log).copied());
+                @let known = columns.iter().filter_map(|(_, _, values)| values.get(log).copied());
                 @let best = known.fold(f64::NEG_INFINITY, f64::max);
                 tr {
                     th scope="row" { (log) }
-                    @for (_, values) in &columns { (log_cell(values.get(log).copied(), best, columns.len())) }
+                    @for (_, _, values) in &columns { (log_cell(values.get(log).copied(), best, columns.len())) }
                 }
             }
         };
