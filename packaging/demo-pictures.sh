@@ -8,7 +8,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 $tagalong simulate configs/scenes/crowd.toml -o "$work/crowd.mcap"
 $tagalong run configs/depth-verified.toml "$work/crowd.mcap" -o "$work/run" --overlay
-$tagalong view "$work/run" --from 9.5 --to 13.5 --animation docs/demo.gif --width 600 --fps 6 --overwrite
+$tagalong view "$work/run" --from 11.7 --to 15.7 --animation docs/demo.gif --width 600 --fps 6 --overwrite
 cp "$work/run/overlay/000120.png" docs/demo.png
 for picture in docs/demo.gif docs/demo.png; do
   bytes=$(wc -c < "$picture")

@@ -81,7 +81,7 @@ pub struct AnnotateArgs {
 /// Examples for `tagalong annotate --help`.
 pub const HELP: &str = "\
 Opens a page for your browser on this computer; nothing leaves it. A pipeline proposes tracks, unless the
-file exists: then that is continued. Click a head or drag a box; a digit is the number of the person;
+file exists: then that is continued. Click a head or drag a box; a digit is the ID of the person;
 between two boxes that were set the others are interpolated; depth fills in the places. The file is
 written whole after every change, so a kill loses nothing. `Finish` in the page ends with exit code 0,
 Ctrl-C with 130; the file is whole in both cases. `eval`, `bench` and `view` find it beside the log.
@@ -118,8 +118,11 @@ pub fn annotate(args: &AnnotateArgs, registry: &Registry) -> Outcome {
     } else {
         material.people
     };
-    let origin =
-        if continues { format!("{} is continued", output.display()) } else { material.origin };
+    let origin = if continues {
+        "the annotation in the file is continued".to_owned()
+    } else {
+        material.origin
+    };
     say(&origin);
     let app = app(args, film, people, &output, origin);
     print(&format!(

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use tagalong_app::outcome::Failure;
+use tagalong_math::counted;
 use tagalong_report::{Benchmark, Outcome, TaskResult, Timings};
 
 use super::moments;
@@ -90,6 +91,9 @@ pub fn write(store: &Store, benchmark: &Benchmark) -> Result<String, Failure> {
     Ok(json)
 }
 
+/// Most skipped tasks that have a line with the reason in a terminal.
+const MOST_REASONS: usize = 6;
+
 /// Returns the main figures, for a terminal.
 pub fn text(store: &Store, benchmark: &Benchmark) -> String {
     let first = benchmark.tasks.iter().map(|task| task.pipeline.len()).fold(8, usize::max);
@@ -98,13 +102,27 @@ pub fn text(store: &Store, benchmark: &Benchmark) -> String {
         "{:<first$}  {:<second$}  {:>6}  {:>6}  {:>6}  {:>6}  {:>5}  {:>10}\n",
         "pipeline", "log", "seed", "HOTA", "MOTA", "IDF1", "IDSW", "error m"
     );
-    for task in &benchmark.tasks {
+    let skipped: Vec<&TaskResult> =
+        benchmark.tasks.iter().filter(|task| is_skipped(task)).collect();
+    let is_brief = skipped.len() > MOST_REASONS;
+    for task in benchmark.tasks.iter().filter(|task| !is_brief || !is_skipped(task)) {
         let _ = write!(out, "{:<first$}  {:<second$}  {:>6}  ", task.pipeline, task.log, task.seed);
         let _ = match &task.outcome {
             Outcome::Done => writeln!(out, "{}", figures(task)),
             Outcome::Failed { why } => writeln!(out, "failed: {}", first_line(why)),
             Outcome::Skipped { why } => writeln!(out, "skipped: {}", first_line(why)),
         };
+    }
+    if is_brief {
+        let pipelines: BTreeSet<&str> = skipped.iter().map(|task| task.pipeline.as_str()).collect();
+        let names: Vec<&str> = pipelines.into_iter().collect();
+        let _ = writeln!(
+            out,
+            "skipped {} of {}, with the reasons in report.html: {}",
+            skipped.len(),
+            counted(benchmark.tasks.len(), "task"),
+            names.join(", "),
+        );
     }
     for task in &benchmark.tasks {
         if task.image.is_some_and(|scores| scores.has_constant_scores()) {
@@ -120,6 +138,10 @@ pub fn text(store: &Store, benchmark: &Benchmark) -> String {
     }
     let _ = writeln!(out, "report in {}", store.path("report.html").display());
     out
+}
+
+fn is_skipped(task: &TaskResult) -> bool {
+    matches!(task.outcome, Outcome::Skipped { .. })
 }
 
 fn first_line(text: &str) -> &str {

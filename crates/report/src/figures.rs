@@ -140,7 +140,7 @@ const FIGURES: &[Figure] = &[
         range: POSITIVE,
         decimals: 1,
         higher_is_better: false,
-        meaning: "How often a person's number changes, per log.",
+        meaning: "How often the ID of a person changes, per log.",
         of: |s| Some(s.idsw as f64),
         ..RATE
     },

@@ -425,8 +425,49 @@ fn each_pair_says_in_one_line_why() {
     assert!(line.contains(" people, ") && line.contains(" misses of "), "{line}");
     let line = line.replace("&quot;", "\"");
     let dropped_by =
-        |test: &str| line.ends_with(&format!(" the test \"{test}\" dropped the candidate."));
+        |test: &str| line.contains(&format!(" the test \"{test}\" dropped the candidate"));
     assert!(dropped_by("margin") || dropped_by("size"), "{line}");
+}
+
+#[test]
+fn a_pair_that_finds_the_same_people_differs_in_its_false_reports() {
+    let mut benchmark = two_by_three();
+    let noisy = benchmark.tasks[0].pipeline.clone();
+    for task in &mut benchmark.tasks {
+        let rate = if task.pipeline == noisy { 1.25 } else { 0.0 };
+        let scores = task.image.as_mut().unwrap();
+        scores.never_confirmed = 0;
+        scores.fp_per_frame = Some(rate);
+    }
+    let page = html(&benchmark, None);
+    assert!(page.contains(">Both found "), "both find everybody");
+    assert!(page.contains(&format!("; {noisy} reports 1.25 false people per frame, ")));
+}
+
+#[test]
+fn a_mean_of_two_logs_shows_no_interval() {
+    let two = [("a", "x", 0.25), ("a", "y", 0.35), ("b", "x", 0.75), ("b", "y", 0.7)];
+    let three = [&two[..], &[("a", "z", 0.3), ("b", "z", 0.72)]].concat();
+    let cell = "class=\"ends\">0.";
+    assert!(html(&with_hota(&three), None).contains(cell));
+    assert!(!html(&with_hota(&two), None).contains(cell));
+}
+
+#[test]
+fn a_pipeline_that_no_log_suits_has_no_row_and_its_reasons_are_listed() {
+    let mut benchmark = two_by_three();
+    let logs = ["hall", "lab", "yard"];
+    benchmark.tasks.extend(logs.map(|log| TaskResult {
+        pipeline: "stereo".into(),
+        log: log.into(),
+        outcome: Outcome::Skipped { why: "no right images".into() },
+        ..TaskResult::default()
+    }));
+    let page = html(&benchmark, None);
+    let results = &page[page.find("id=\"results\"").unwrap()..page.find("id=\"failed\"").unwrap()];
+    assert!(results.contains("1 pipeline that no log suits is left out"), "{results}");
+    assert!(!results.contains("stereo"));
+    assert_eq!(page.matches("no right images").count(), logs.len());
 }
 
 #[test]

@@ -7,8 +7,8 @@ use super::{MOST_DRAWN, Page, cell, column, number, table};
 use crate::chart::{Curve, Extent, Words, bar, key, miss_rate, plan, series_class};
 use crate::model::TaskResult;
 
-/// Logs up to which all plans are open: of more the page would be long.
-const OPEN_PLANS: usize = 2;
+/// Most plans that are open, by whole logs: with more the page would be long.
+const OPEN_PLANS: usize = 4;
 
 impl Page<'_> {
     pub(super) fn miss_rates(&self) -> Option<Markup> {
@@ -62,8 +62,12 @@ impl Page<'_> {
     }
 
     pub(super) fn plans(&self) -> Option<Markup> {
-        let logs: Vec<Markup> =
-            self.view.logs.iter().filter_map(|log| self.plans_of(log)).collect();
+        let mut logs: Vec<Markup> = Vec::new();
+        let mut drawn = 0;
+        for log in &self.view.logs {
+            drawn += self.drawn(log).count();
+            logs.extend(self.plans_of(log, drawn <= OPEN_PLANS));
+        }
         (!logs.is_empty()).then(|| html! {
             p {
                 "Where people were (wide and pale) and where the tracks put them (thin, with the ID at the end), "
@@ -74,12 +78,12 @@ impl Page<'_> {
         })
     }
 
-    fn plans_of(&self, log: &str) -> Option<Markup> {
+    fn plans_of(&self, log: &str, is_open: bool) -> Option<Markup> {
         let tasks: Vec<&TaskResult> = self.drawn(log).collect();
         // One extent for all pipelines, so that their plans can be compared at sight.
         let extent = Extent::around(tasks.iter().flat_map(|t| t.truth.iter().chain(&t.tracks)))?;
         Some(html! {
-            details class="print" open[self.view.logs.len() <= OPEN_PLANS] {
+            details class="print" open[is_open] {
                 summary { (log) }
                 div class="charts plans" { @for task in &tasks { (plan_of(task, extent, self.series(&task.pipeline))) } }
             }

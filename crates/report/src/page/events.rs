@@ -103,13 +103,12 @@ impl Page<'_> {
                 *counts.entry(&event.kind).or_default().entry(&task.pipeline).or_default() += 1;
             }
         }
-        let columns = self.view.pipelines.iter().enumerate();
-        let head = html! { (column("Kind", None)) @for (rank, p) in columns { (self.column_of(rank, p)) } };
+        let head = html! { (column("Kind", None)) @for (rank, p) in self.tried() { (self.column_of(rank, p)) } };
         let body = html! {
             @for (name, of) in &counts {
                 tr {
                     th scope="row" { (kind(name)) }
-                    @for p in &self.view.pipelines { (cell(of.get(p).copied().unwrap_or(0) as f64, &html! { (of.get(p).copied().unwrap_or(0)) })) }
+                    @for (_, p) in self.tried() { (cell(of.get(p).copied().unwrap_or(0) as f64, &html! { (of.get(p).copied().unwrap_or(0)) })) }
                 }
             }
         };

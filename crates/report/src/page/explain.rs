@@ -15,8 +15,8 @@ impl Page<'_> {
                 "A figure is formed per log, over the seeds first, and then averaged over logs: each log counts once, however long it is. "
                 "Its 95 % interval is Student's, over logs, not frames, because frames of one recording resemble each other. "
                 "A mean of one log has none, and neither has one of logs that all show the same value: they do not tell how much others "
-                "differ. Of figures between two fixed ends, as HOTA from 0 to 1, an interval that leaves out less than a twentieth of the "
-                "values at each end is not shown in the tables, because it says next to nothing; report.json has it. "
+                "differ. Two kinds of intervals say next to nothing and are in report.json alone: those of two logs, and, of figures between "
+                "two fixed ends, as HOTA from 0 to 1, those that leave out less than a twentieth of the values at each end. "
                 "No interval knows places of a kind that no log shows. Differences between two pipelines are formed in pairs, log by log. "
                 "Rates of people found have Wilson intervals, widened by what the logs differ in."
             }

@@ -2,7 +2,7 @@ use maud::{Markup, html};
 use tagalong_math::counted;
 
 use super::pairs::p_text;
-use super::{Page, cell, column, no_cell, number, table};
+use super::{Page, cell, column, no_cell, number, table, was_skipped};
 use crate::chart::{interval, key, series_class};
 use crate::figures::{ComparisonSpace, Figure, MAIN};
 use crate::model::copies_note;
@@ -15,10 +15,17 @@ impl Page<'_> {
         }
         let shown: Vec<ComparisonSpace> =
             ComparisonSpace::ALL.into_iter().filter(|p| self.has(*p)).collect();
+        let skipped = self.summary.pipelines.iter().filter(|p| was_skipped(p)).count();
         html! {
             @if let Some(verdict) = self.verdict() { p class="verdict" { (verdict) } }
             @if shown.is_empty() { p { "No task has been compared with a truth, so there are no figures." } }
             @for logs in self.view.copies { p class="bad" { (copies_note(logs)) "." } }
+            @if skipped > 0 {
+                p {
+                    (counted(skipped, "pipeline")) " that no log suits " (if skipped == 1 { "is" } else { "are" })
+                    " left out: " a href="#failed" { "the reasons" } "."
+                }
+            }
             @for place in shown {
                 h3 { (place_name(place)) }
                 (self.headline_table(place))
@@ -87,7 +94,7 @@ impl Page<'_> {
             @for figure in &figures { (figure_head(figure)) }
         };
         let body = html! {
-            @for summary in &self.summary.pipelines {
+            @for summary in self.summary.pipelines.iter().filter(|p| !was_skipped(p)) {
                 tr.(series_class(self.series(&summary.pipeline))) data-series=(self.series(&summary.pipeline)) {
                     th scope="row" { (key(self.series(&summary.pipeline), &summary.pipeline)) }
                     (done_cell(summary, most))
@@ -97,7 +104,9 @@ impl Page<'_> {
             }
         };
         let caption = html! {
-            "Means over logs, " (place_where(place)) ", with 95\u{a0}% intervals. "
+            "Means over logs, " (place_where(place))
+            @if self.view.logs.len() as u64 >= LEAST_LOGS { ", with 95\u{a0}% intervals" }
+            ". "
             span class="best" { "★ best" } " of the pipelines with the most logs."
         };
         table(&format!("Results {}", place_where(place)), &caption, &head, &body)
@@ -121,7 +130,7 @@ impl Page<'_> {
         let most = all.iter().map(|e| e.logs).max().unwrap_or(0);
         // One picture per row is enough: that of the ranking figure.
         let picture = (figure.name == MAIN.name)
-            .then(|| interval(estimate.mean, estimate.interval, range(&all)));
+            .then(|| interval(estimate.mean, shown_interval(estimate), range(&all)));
         cell(
             estimate.mean,
             &html! {
@@ -129,7 +138,7 @@ impl Page<'_> {
                     @if estimate.best { "★ " } (number(estimate.mean, figure.decimals))
                     @if estimate.best { span class="unseen" { " best" } }
                 }
-                @if let Some(ends) = estimate.interval.filter(|ends| informs(ends, figure.range)) {
+                @if let Some(ends) = shown_interval(estimate).filter(|ends| informs(ends, figure.range)) {
                     " " (ends_of(ends, figure.decimals))
                 }
                 @if estimate.logs < most { span class="fewer" { (counted(estimate.logs, "log")) " only" } }
@@ -141,20 +150,23 @@ impl Page<'_> {
     /// Renders the main figure of each pipeline on each log.
     fn log_table(&self, place: ComparisonSpace) -> Markup {
         let columns: Vec<_> =
-            self.view.pipelines.iter().map(|p| (*p, per_log(&self.view, p, MAIN, place))).collect();
-        let logs =
-            self.view.logs.iter().filter(|log| columns.iter().any(|(_, v)| v.contains_key(*log)));
+            self.tried().map(|(rank, p)| (rank, p, per_log(&self.view, p, MAIN, place))).collect();
+        let logs = self
+            .view
+            .logs
+            .iter()
+            .filter(|log| columns.iter().any(|(_, _, v)| v.contains_key(*log)));
         let head = html! {
             (column("Log", None))
-            @for (rank, (name, _)) in columns.iter().enumerate() { (self.column_of(rank, name)) }
+            @for (rank, name, _) in &columns { (self.column_of(*rank, name)) }
         };
         let body = html! {
             @for log in logs {
-                @let known = columns.iter().filter_map(|(_, values)| values.get(log).copied());
+                @let known = columns.iter().filter_map(|(_, _, values)| values.get(log).copied());
                 @let best = known.fold(f64::NEG_INFINITY, f64::max);
                 tr {
                     th scope="row" { (log) }
-                    @for (_, values) in &columns { (log_cell(values.get(log).copied(), best, columns.len())) }
+                    @for (_, _, values) in &columns { (log_cell(values.get(log).copied(), best, columns.len())) }
                 }
             }
         };
@@ -234,6 +246,15 @@ const SHARE: [f64; 2] = [0.0, 1.0];
 /// a cell.
 const LEAST_INFORMATION: f64 = 0.05;
 
+/// Least number of logs of which the interval of a mean is shown: that of two logs is 25 times as wide as
+/// its standard error, and hides the figures beside it.
+const LEAST_LOGS: u64 = 3;
+
+/// Returns the interval of a mean over enough logs.
+fn shown_interval(estimate: &Estimate) -> Option<[f64; 2]> {
+    estimate.interval.filter(|_| estimate.logs >= LEAST_LOGS)
+}
+
 /// Returns false for an interval that covers nearly all values that a figure of this range can have.
 /// One of a range without an end, as of a count, always leaves out some.
 fn informs(ends: &[f64; 2], [least, most]: [f64; 2]) -> bool {
@@ -268,8 +289,9 @@ fn p_equals(p: f64) -> String {
 
 /// Returns the range from the lowest to the highest end of all, including zero.
 fn range(all: &[&Estimate]) -> [f64; 2] {
-    let ends =
-        all.iter().flat_map(|e| e.interval.unwrap_or([e.mean, e.mean]).into_iter().chain([e.mean]));
+    let ends = all
+        .iter()
+        .flat_map(|e| shown_interval(e).unwrap_or([e.mean, e.mean]).into_iter().chain([e.mean]));
     ends.fold([0.0, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)])
 }
 

@@ -15,7 +15,7 @@ use tagalong_math::counted;
 
 use crate::chart::minus;
 use crate::model::{Benchmark, Moment, Outcome, Timings};
-use crate::summary::Summary;
+use crate::summary::{PipelineSummary, Summary};
 use crate::view::OrderedBenchmark;
 
 /// Style that all pages have in common: colours as CSS variables, for light and dark, letters, tables.
@@ -171,10 +171,21 @@ impl Page<'_> {
         }
     }
 
+    /// Returns the pipelines that some log suits, each with its rank.
+    fn tried(&self) -> impl Iterator<Item = (usize, &str)> + Clone {
+        let ranked = self.view.pipelines.iter().copied().enumerate();
+        ranked.filter(|(_, name)| self.summary.pipeline(name).is_none_or(|p| !was_skipped(p)))
+    }
+
     /// Returns the index of a pipeline, for colour, shape and dashes.
     fn series(&self, pipeline: &str) -> usize {
         self.view.pipelines.iter().position(|p| *p == pipeline).unwrap_or(0)
     }
+}
+
+/// Returns true for a pipeline that was skipped on each log.
+fn was_skipped(summary: &PipelineSummary) -> bool {
+    summary.skipped > 0 && summary.done + summary.failed == 0
 }
 
 /// Formats a number; a dash if it is not finite.

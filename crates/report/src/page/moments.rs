@@ -93,14 +93,14 @@ impl Page<'_> {
         tests.sort_by_key(|(test, of)| (std::cmp::Reverse(of.values().sum::<u64>()), *test));
         let head = html! {
             (column("Test", None)) (column("Why", Some("With the settings of the first pipeline that has the test")))
-            @for (rank, p) in self.view.pipelines.iter().enumerate() { (self.column_of(rank, p)) }
+            @for (rank, p) in self.tried() { (self.column_of(rank, p)) }
         };
         let body = html! {
             @for (test, of) in &tests {
                 tr {
                     th scope="row" { (test) }
                     td { (self.deciding_anywhere(test)) }
-                    @for p in &self.view.pipelines {
+                    @for (_, p) in self.tried() {
                         @if let Some(count) = of.get(p) { (cell(*count as f64, &html! { (count) })) } @else { (no_cell()) }
                     }
                 }

@@ -6,7 +6,7 @@ use tagalong_math::counted;
 use super::events::{event_id, kind};
 use super::headline::{ends_of, place_where};
 use super::moments::NO_CANDIDATE;
-use super::{Page, cell, column, no_cell, number, signed, table};
+use super::{MOST_UNFOLDED, Page, cell, column, no_cell, number, signed, table};
 use crate::chart::key;
 use crate::compare::{Difference, SAME_EVENT_S, compare_in};
 use crate::figures::{ComparisonSpace, Figure, MAIN};
@@ -14,6 +14,33 @@ use crate::summary::PairSummary;
 
 /// Most differences listed of all pairs together; the rest is counted.
 const MOST_LISTED: usize = 1200;
+
+/// A kind of error that can be what two pipelines differ in.
+struct ErrorKind {
+    /// Key of its figure in the summary.
+    figure: &'static str,
+    /// Least difference of the means over logs that is named.
+    least: f64,
+    decimals: usize,
+    /// What the pipeline with more of it does, and how often.
+    words: [&'static str; 2],
+}
+
+/// Errors beside misses, which are named by their tests.
+const ERROR_KINDS: [ErrorKind; 2] = [
+    ErrorKind {
+        figure: "image.fp_per_frame",
+        least: 0.02,
+        decimals: 2,
+        words: ["reports", "false people per frame"],
+    },
+    ErrorKind {
+        figure: "image.IDSW",
+        least: 0.5,
+        decimals: 1,
+        words: ["switches IDs", "times per log"],
+    },
+];
 
 /// Most pipelines of which each pair is described; of more it is the best one against others.
 const ALL_PAIRS_OF: usize = 4;
@@ -40,14 +67,14 @@ impl Page<'_> {
             @if self.view.pipelines.len() > 2 { (self.matrix()) }
             @let pairs = self.described_pairs();
             @for (a, b) in &pairs { (self.pair(a, b, MOST_LISTED / pairs.len())) }
-            @if self.view.pipelines.len() > ALL_PAIRS_OF {
+            @if self.tried().count() > ALL_PAIRS_OF {
                 p { "Described is the best pipeline against the next ones; all pairs are in report.json." }
             }
         })
     }
 
-    /// Says in one line in what a pair differs: people found, and the test that costs the worse one
-    /// most.
+    /// Says in one line in what a pair differs: people found, the test that costs the worse one most, and
+    /// other errors.
     pub(super) fn why_of_pair(&self, a: &str, b: &str) -> Option<String> {
         let [mut better, mut worse] = [a, b].map(|name| {
             let found = self.summary.pipeline(name).and_then(|it| it.people_found_count());
@@ -58,10 +85,11 @@ impl Page<'_> {
             std::mem::swap(&mut better, &mut worse);
         }
         let people = self.summary.pipeline(worse.2)?.people;
-        let mut line = format!(
-            "{} found {} of {people} people, {} {}",
-            better.2, better.1?, worse.2, worse.1?
-        );
+        let mut line = if better.1? == worse.1? {
+            format!("Both found {} of {people} people", better.1?)
+        } else {
+            format!("{} found {} of {people} people, {} {}", better.2, better.1?, worse.2, worse.1?)
+        };
         let all: u64 = worse.0.values().sum();
         let costly = worse.0.iter().max_by_key(|(test, count)| (**count, std::cmp::Reverse(*test)));
         if let Some((test, count)) = costly {
@@ -72,7 +100,28 @@ impl Page<'_> {
             };
             line += &format!("; {why}");
         }
+        for kind in &ERROR_KINDS {
+            if let Some(difference) = self.errors_of_pair(kind, better.2, worse.2) {
+                line += &format!("; {difference}");
+            }
+        }
         Some(line)
+    }
+
+    /// Says how often two pipelines make an error, the worse one first, if they differ in that.
+    fn errors_of_pair(&self, kind: &ErrorKind, a: &str, b: &str) -> Option<String> {
+        let a = (self.mean_of(kind.figure, a)?, a);
+        let b = (self.mean_of(kind.figure, b)?, b);
+        let (more, fewer) = if a.0 > b.0 { (a, b) } else { (b, a) };
+        let [does, how_often] = kind.words;
+        (more.0 - fewer.0 >= kind.least).then(|| {
+            let [many, few] = [more.0, fewer.0].map(|mean| number(mean, kind.decimals));
+            format!("{} {does} {many} {how_often}, {} {few}", more.1, fewer.1)
+        })
+    }
+
+    fn mean_of(&self, figure: &str, pipeline: &str) -> Option<f64> {
+        Some(self.summary.pipeline(pipeline)?.figures.get(figure)?.mean)
     }
 
     /// Returns the missed people in frames of a pipeline by test, over the runs that are drawn.
@@ -88,7 +137,8 @@ impl Page<'_> {
 
     /// Returns the pairs that are described, each in the order of the names.
     fn described_pairs(&self) -> Vec<(&str, &str)> {
-        let names = &self.view.pipelines;
+        let names: Vec<&str> = self.tried().map(|(_, name)| name).collect();
+        let names = &names;
         // Of many pipelines only the first one is compared with each other one.
         let firsts = if names.len() > ALL_PAIRS_OF { 1 } else { names.len() };
         let pairs = (0..firsts).flat_map(|i| names[i + 1..].iter().map(move |b| (names[i], *b)));
@@ -102,16 +152,16 @@ impl Page<'_> {
             .into_iter()
             .find(|place| self.summary.pairs.iter().any(|pair| pair.figure == MAIN.key(*place)));
         let Some(place) = place else { return html! {} };
-        let names = &self.view.pipelines;
+        let names = self.tried();
         let head = html! {
             (column("Pipeline", None))
-            @for (rank, name) in names.iter().enumerate() { (self.column_of(rank, name)) }
+            @for (rank, name) in names.clone() { (self.column_of(rank, name)) }
         };
         let body = html! {
-            @for (rank, row) in names.iter().enumerate() {
+            @for (rank, row) in names.clone() {
                 tr {
                     th scope="row" { (rank + 1) " " (key(rank, row)) }
-                    @for other in names { (self.gain_cell(row, other, place)) }
+                    @for (_, other) in names.clone() { (self.gain_cell(row, other, place)) }
                 }
             }
         };
@@ -119,7 +169,13 @@ impl Page<'_> {
             (MAIN.name) " " (place_where(place)) ": the pipeline of the row less that of the column, over the logs in common, "
             "best pipeline first. Bold with an arrow: clear."
         };
-        html! { div class="matrix" { (table("Each pipeline against each other", &caption, &head, &body)) } }
+        let name = "Each pipeline against each other";
+        html! {
+            details class="print" open[names.count() <= MOST_UNFOLDED] {
+                summary { (name) }
+                div class="matrix" { (table(name, &caption, &head, &body)) }
+            }
+        }
     }
 
     fn gain_cell(&self, row: &str, other: &str, place: ComparisonSpace) -> Markup {

@@ -1,12 +1,16 @@
 use std::collections::BTreeSet;
 
 use maud::{Markup, html};
+use tagalong_math::counted;
 
 use super::headline::span_of;
-use super::{Page, cell, column, no_cell, number, optional_cell, table};
+use super::{MOST_UNFOLDED, Page, cell, column, no_cell, number, optional_cell, table};
 use crate::chart::key;
 use crate::figures::ComparisonSpace;
 use crate::model::{Outcome, TaskResult};
+
+/// Name of an outcome that is a fault, not a choice.
+const FAILED: &str = "failed";
 
 impl Page<'_> {
     pub(super) fn failed(&self) -> Option<Markup> {
@@ -14,6 +18,9 @@ impl Page<'_> {
             self.view.tasks.iter().filter_map(|t| Some((*t, reason(&t.outcome)?))).collect();
         let lost: Vec<&TaskResult> =
             self.view.tasks.iter().copied().filter(|t| t.data_lost).collect();
+        // Failures are to be seen; of skipped tasks, which no log suits, there may be hundreds.
+        let is_open = not_done.len() <= MOST_UNFOLDED
+            || not_done.iter().any(|(_, (outcome, _))| *outcome == FAILED);
         let head = html! { (column("Pipeline", None)) (column("Log", None)) (column("Seed", None)) (column("Outcome", None)) (column("Why", None)) };
         let body = html! {
             @for (task, (outcome, why)) in &not_done {
@@ -21,7 +28,7 @@ impl Page<'_> {
                     th scope="row" { (key(self.series(&task.pipeline), &task.pipeline)) }
                     td class="log" { (task.log) }
                     (cell(task.seed as f64, &html! { (task.seed) }))
-                    td { @if *outcome == "failed" { strong class="bad" { "✕ failed" } } @else { (outcome) } }
+                    td { @if *outcome == FAILED { strong class="bad" { "✕ failed" } } @else { (outcome) } }
                     td class="why" { (why) }
                 }
             }
@@ -29,7 +36,10 @@ impl Page<'_> {
         (!not_done.is_empty() || !lost.is_empty()).then(|| html! {
             p { "None of these enters a mean. A pipeline with fewer logs than another is marked, and is never called the best." }
             @if !not_done.is_empty() {
-                (table("Failed and skipped tasks", &html! { "Tasks without a result." }, &head, &body))
+                details class="print" open[is_open] {
+                    summary { (counted(not_done.len(), "task")) }
+                    (table("Failed and skipped tasks", &html! { "Tasks without a result." }, &head, &body))
+                }
             }
             @if !lost.is_empty() {
                 p { "Part of the log was lost or unusable in: " @for (i, t) in lost.iter().enumerate() { @if i > 0 { ", " } (t.pipeline) " on " (t.log) } ". These count." }
@@ -125,7 +135,7 @@ impl Page<'_> {
 fn reason(outcome: &Outcome) -> Option<(&'static str, &str)> {
     match outcome {
         Outcome::Done => None,
-        Outcome::Failed { why } => Some(("failed", why)),
+        Outcome::Failed { why } => Some((FAILED, why)),
         Outcome::Skipped { why } => Some(("skipped", why)),
     }
 }

@@ -88,7 +88,7 @@ fn whole(
             noscript { p { "This page needs JavaScript, which is inside it." } }
             @if data.live { p id="alive" class="alive" role="status" { "Waiting for the first frame." } }
             (stage(&names))
-            (time_line(names.len()))
+            (time_line(&names))
             (answers(&names))
         }
         footer { p { "Made by Tagalong " (env!("CARGO_PKG_VERSION")) "." } }
@@ -208,14 +208,17 @@ fn strip_legend() -> Markup {
 }
 
 /// Renders the controls, which stay in view.
-fn time_line(runs: usize) -> Markup {
+fn time_line(names: &[&str]) -> Markup {
     let button = |id: &str, sign: &str, name: &str| {
         html! { button type="button" id=(id) aria-label=(name) title=(name) { (sign) } }
     };
     html! {
         section class="time" aria-label="Time line" {
             div class="strips" aria-hidden="true" {
-                @for number in 0..runs { svg class="strip" id=(format!("strip-{number}")) {} }
+                @for (number, name) in names.iter().enumerate() {
+                    @if names.len() > 1 { span class="strip-name" { (name) } }
+                    svg class="strip" id=(format!("strip-{number}")) {}
+                }
             }
             (strip_legend())
             input type="range" id="frame" min="0" max="0" value="0" step="1" aria-label="Frame";

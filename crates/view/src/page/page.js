@@ -602,10 +602,10 @@
     return tracksNear(run.frames[at], question).filter((track) => question.person === undefined || !taken.includes(track.id));
   };
 
-  // The track that was confirmed at this place shortly before, and is not any more.
-  const ENDED_S = 2;
-  const endedNear = (run, question) => {
-    for (let i = state.at - 1; i >= 0 && data.t[state.at] - data.t[i] <= ENDED_S; i -= 1) {
+  // The track that was confirmed at this place shortly before, and is not here any more.
+  const LAST_S = 2;
+  const lastNear = (run, question) => {
+    for (let i = state.at - 1; i >= 0 && data.t[state.at] - data.t[i] <= LAST_S; i -= 1) {
       const before = run.frames[i] && freeTracks(run, i, question).find((track) => track.state !== "tentative");
       if (before) return { id: before.id, s: data.t[state.at] - data.t[i] };
     }
@@ -637,8 +637,13 @@
     }
     const test = decidingTest(run, frame, question);
     const why = test ? sentence(run, test) : "no detector proposed a candidate near this place";
-    const ended = endedNear(run, question);
-    return ended ? `Track ${ended.id} ended ${fixed(ended.s, 1)} s before, and no new one began: ${why}.` : `No track began here: ${why}.`;
+    const last = lastNear(run, question);
+    if (!last) return `No track began here: ${why}.`;
+    const ago = `${fixed(last.s, 1)} s before`;
+    // A track that is on another person now has not ended.
+    const isElsewhere = frame.tracks.some((other) => other.id === last.id);
+    const course = isElsewhere ? `Track ${last.id} was here ${ago} and is elsewhere now` : `Track ${last.id} ended ${ago}`;
+    return `${course}, and no new one began: ${why}.`;
   };
 
   // Many tests drop thousands of places and record some of them.
