@@ -1,9 +1,21 @@
-"""Lists ID switches and inherited IDs of a run, with the frames and the people.
+"""Lists ID switches and inherited IDs of runs, with their kinds, as a Markdown table.
 
-Usage: python benches/identities.py TRUTH.people.csv RUN_FOLDER
+Usage: python3 benches/identities.py LOGS_FOLDER RUNS_FOLDER LOG...
+       python3 benches/identities.py TRUTH.people.csv RUN_FOLDER
 
-A switch: a person has another ID than when matched last. An inherited ID: a person has the ID that
-another person had last. Boxes match at an IoU of 0.4 and more, the best pairs of a frame first.
+The first form reads LOGS_FOLDER/LOG.people.csv and RUNS_FOLDER/LOG. A switch: a person has another ID
+than when matched last. An inherited ID: a person has the ID that another person had last. Boxes match
+at an IoU of 0.4 and more, the best pairs of a frame first.
+
+Kinds, the first that fits:
+  of the one beside    inherited while the person whose ID it was is in the frame
+  of a vague track     inherited from a track that was reported in each frame since
+  recognised wrongly   inherited from a person without a track
+  swapped              switched in the frame in which somebody else takes the earlier ID
+  lost while hidden    switched after a frame in which another person hides a quarter or more
+  lost at the border   switched after, or in, a frame in which the border cuts the person
+  lost at low rate     switched, at images more than 0.4 s apart
+  lost                 switched otherwise
 """
 
 import csv
@@ -11,15 +23,34 @@ import sys
 from pathlib import Path
 
 MIN_IOU = 0.4
+LOW_RATE_S = 0.4
+HIDDEN = 0.8
+
+
+class Person:
+    """One annotated person in one frame."""
+
+    def __init__(self, row):
+        self.number = int(row["id"])
+        self.box = tuple(float(row[key]) for key in ("ub_x", "ub_y", "ub_w", "ub_h"))
+        self.occluder = row.get("occluder", "0")
+        self.visible = float(row.get("visible") or 1.0)
+
+    def is_hidden(self):
+        """Returns true if another person hides a quarter of this one or more."""
+        return self.occluder.isdigit() and self.occluder != "0" and self.visible < HIDDEN
+
+    def is_at_border(self):
+        """Returns true if the border cuts the person, or the box begins at it."""
+        return self.occluder == "border" or self.box[0] <= 0.0
 
 
 def read_truth(path):
-    """Returns the people of each frame: number and box."""
+    """Returns the people of each frame."""
     frames = {}
     with open(path) as file:
         for row in csv.DictReader(file):
-            box = tuple(float(row[key]) for key in ("ub_x", "ub_y", "ub_w", "ub_h"))
-            frames.setdefault(int(row["frame"]), []).append((int(row["id"]), box))
+            frames.setdefault(int(row["frame"]), []).append(Person(row))
     return frames
 
 
@@ -34,6 +65,18 @@ def read_tracks(path):
     return frames
 
 
+def read_reported(path):
+    """Returns the IDs of each frame, predicted ones too, and the median time between frames, s."""
+    frames, stamps = {}, {}
+    with open(path) as file:
+        for row in csv.DictReader(file):
+            frames.setdefault(int(row["frame"]), set()).add(int(row["id"]))
+            stamps[int(row["frame"])] = int(row["stamp_ns"]) / 1e9
+    order = sorted(stamps)
+    steps = sorted((stamps[b] - stamps[a]) / (b - a) for a, b in zip(order, order[1:]))
+    return frames, steps[len(steps) // 2] if steps else 0.0
+
+
 def iou(a, b):
     """Returns the intersection over union of two boxes."""
     width = min(a[0] + a[2], b[0] + b[2]) - max(a[0], b[0])
@@ -45,7 +88,7 @@ def iou(a, b):
 
 def matches(people, tracks):
     """Returns pairs of a person's number and a track's ID, sorted."""
-    pairs = sorted(((iou(box, seen), person, track) for person, box in people
+    pairs = sorted(((iou(person.box, seen), person.number, track) for person in people
                     for track, seen in tracks), reverse=True)
     taken, found = set(), []
     for overlap, person, track in pairs:
@@ -55,25 +98,73 @@ def matches(people, tracks):
     return sorted(found)
 
 
-def main():
-    if len(sys.argv) != 3:
-        sys.exit(__doc__)
-    truth = read_truth(sys.argv[1])
-    tracks = read_tracks(Path(sys.argv[2]) / "tracks.csv")
+def kind_of_inherited(truth, reported, frame, last_person, last_frame, track):
+    """Returns the kind of an inherited ID."""
+    if any(person.number == last_person for person in truth[frame]):
+        return "of the one beside"
+    between = range(last_frame + 1, frame)
+    if all(track in reported.get(index, ()) for index in between):
+        return "of a vague track"
+    return "recognised wrongly"
+
+
+def kind_of_switch(truth, step_s, frame, person, last_frame, holders, last_id):
+    """Returns the kind of a switch; `holders` are the people of this frame by their IDs."""
+    if holders.get(last_id, person) != person:
+        return "swapped"
+    seen = [one for index in range(last_frame, frame + 1) for one in truth.get(index, ())
+            if one.number == person]
+    if any(one.is_hidden() for one in seen):
+        return "lost while hidden"
+    if step_s > LOW_RATE_S:
+        return "lost at low rate"
+    if any(one.is_at_border() for one in seen):
+        return "lost at the border"
+    return "lost"
+
+
+def events(truth_path, run):
+    """Returns the switches and the inherited IDs of a run: frame, event, kind."""
+    truth = read_truth(truth_path)
+    tracks = read_tracks(Path(run) / "tracks.csv")
+    reported, step_s = read_reported(Path(run) / "tracks-metres.csv")
     id_of, person_of, switches, inherited = {}, {}, [], []
     for frame in sorted(truth):
-        for person, track in matches(truth[frame], tracks.get(frame, [])):
+        matched = matches(truth[frame], tracks.get(frame, []))
+        holders = {track: person for person, track in matched}
+        for person, track in matched:
             last_id, last_frame = id_of.get(person, (track, frame))
             if last_id != track:
-                switches.append(f"frame {frame}: person {person} is {track}, and was {last_id} in "
-                                f"frame {last_frame}")
+                kind = kind_of_switch(truth, step_s, frame, person, last_frame, holders, last_id)
+                switches.append((frame, f"person {person} is {track}, and was {last_id} in frame "
+                                        f"{last_frame}", kind))
             last_person, last_frame = person_of.get(track, (person, frame))
             if last_person != person:
-                inherited.append(f"frame {frame}: person {person} has the ID {track} that person "
-                                 f"{last_person} had in frame {last_frame}")
+                kind = kind_of_inherited(truth, reported, frame, last_person, last_frame, track)
+                inherited.append((frame, f"person {person} has the ID {track} that person "
+                                         f"{last_person} had in frame {last_frame}", kind))
             id_of[person], person_of[track] = (track, frame), (person, frame)
-    for title, events in (("switches", switches), ("inherited IDs", inherited)):
-        print(f"{len(events)} {title}", *events, sep="\n  ")
+    return switches, inherited
+
+
+def main():
+    arguments = sys.argv[1:]
+    if len(arguments) < 2:
+        sys.exit(__doc__)
+    if len(arguments) == 2:
+        runs = [(Path(arguments[1]).name, arguments[0], arguments[1])]
+    else:
+        logs, folder = Path(arguments[0]), Path(arguments[1])
+        runs = [(log, logs / f"{log}.people.csv", folder / log) for log in arguments[2:]]
+    print("| log | frame | event | kind |", "| --- | --- | --- | --- |", sep="\n")
+    counts = [0, 0]
+    for log, truth, run in runs:
+        found = events(truth, run)
+        for kind, listed in enumerate(found):
+            counts[kind] += len(listed)
+        for frame, event, kind in sorted(found[0] + found[1]):
+            print(f"| {log} | {frame} | {event} | {kind} |")
+    print(f"\n{counts[0]} switches, {counts[1]} inherited IDs")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-//! Comparison of the printed, the corrected and the best pipeline on the same scenes.
+//! Comparison of the printed pipeline, the corrected one and ours on the same scenes.
 
 use tagalong_eval::{mean_interval, paired_gain};
 use tagalong_trials::{Judge, Judged, Trial, TrialError};
@@ -68,7 +68,7 @@ fn table(title: &str, draws: &[Vec<Vec<Judged>>], score: Score) -> Table {
         .collect();
     let all: Vec<Vec<Judged>> = draws.concat();
     rows.push(Row::ours("all", cells(&all, score)));
-    let columns = ["printed", "corrected", "best", "corrected - printed", "best - corrected"];
+    let columns = ["printed", "corrected", "ours", "corrected - printed", "ours - corrected"];
     Table {
         title: title.into(),
         columns: columns.map(str::to_owned).to_vec(),
@@ -79,7 +79,7 @@ fn table(title: &str, draws: &[Vec<Vec<Judged>>], score: Score) -> Table {
                 all.len()
             ),
             "Each interval stands for itself: of twenty, one misses what it is of.".into(),
-            format!("printed, corrected, best: {}", PIPELINES.join(", ")),
+            format!("printed, corrected, ours: {}", PIPELINES.join(", ")),
         ],
     }
 }

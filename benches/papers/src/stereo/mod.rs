@@ -118,7 +118,7 @@ pub const STEREO_SVM_EKF: System = System {
         },
         Experiment {
             name: "ladder",
-            about: "not in the paper: printed, corrected and best on the same scenes",
+            about: "not in the paper: printed, corrected and ours on the same scenes",
             run: ladder::ladder,
         },
         Experiment {
@@ -132,5 +132,5 @@ pub const STEREO_SVM_EKF: System = System {
 /// Setting that renders a scene with a stereo camera.
 const STEREO: (&str, &str) = ("camera.kind", "stereo");
 
-/// Configs as printed, corrected, and the best.
+/// Configs as printed, corrected, and ours.
 const PIPELINES: [&str; 3] = ["stereo-svm-ekf-as-printed", "stereo-svm-ekf", "stereo-verified"];

@@ -187,7 +187,7 @@ impl Report {
                  has them.",
                 self.budget, self.seed
             ),
-            "So few rooms bear no interval.".to_owned(),
+            "Too few rooms for an interval: the next one may differ as much as these do.".to_owned(),
         ];
         let too_few = self.pipelines.iter().filter_map(|fitted| {
             fitted.too_few.as_ref().map(|why| format!("{}: {why}.", fitted.name))
