@@ -6,6 +6,9 @@ use std::ops::Range;
 /// Weights are summed in so many parts at once, a register's width or a part of one.
 const LANES: usize = 8;
 
+/// Outputs beside each other that are computed at once: their sums are independent.
+const BLOCK: usize = 4;
+
 /// An image of `CHANNELS` numbers per cell, row by row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Map<const CHANNELS: usize> {
@@ -120,30 +123,81 @@ impl<
         wanted: impl Fn(usize) -> bool,
         finish: impl Fn(f32) -> f32,
     ) {
-        let weights = self.weights.as_chunks::<OUT>().0;
+        let full = Self::full_columns(input.columns, out.columns);
         for row in 0..out.rows {
-            for column in 0..out.columns {
-                if !wanted(row * out.columns + column) {
-                    *out.at_mut(row, column) = [0.0; OUT];
+            let mut column = 0;
+            while column < out.columns {
+                let cells = row * out.columns + column;
+                if column >= full.start && column + BLOCK <= full.end {
+                    if (cells..cells + BLOCK).any(&wanted) {
+                        let sums = self.block(input, [row, column]);
+                        for (k, sums) in sums.into_iter().enumerate() {
+                            let is_wanted = wanted(cells + k);
+                            *out.at_mut(row, column + k) =
+                                if is_wanted { sums.map(&finish) } else { [0.0; OUT] };
+                        }
+                    } else {
+                        out.values.as_chunks_mut::<OUT>().0[cells..cells + BLOCK].fill([0.0; OUT]);
+                    }
+                    column += BLOCK;
                     continue;
                 }
-                let mut sums: [f32; OUT] = *cell(&self.bias, 0);
-                let up = Self::taps(row, input.rows);
-                let across = Self::taps(column, input.columns);
-                for up in up {
-                    for across in across.clone() {
-                        let (seen, first) = Self::tap(input, [row, column], [up, across]);
-                        let weights = &weights[first..first + IN];
-                        for (value, weights) in seen.iter().zip(weights) {
-                            for (sum, weight) in sums.iter_mut().zip(weights) {
-                                *sum += value * weight;
-                            }
-                        }
-                    }
-                }
-                *out.at_mut(row, column) = sums.map(&finish);
+                *out.at_mut(row, column) = if wanted(cells) {
+                    self.sums(input, [row, column]).map(&finish)
+                } else {
+                    [0.0; OUT]
+                };
+                column += 1;
             }
         }
+    }
+
+    /// Returns the sums of an output.
+    #[inline(always)]
+    fn sums(&self, input: &Map<IN>, out: [usize; 2]) -> [f32; OUT] {
+        let weights = self.weights.as_chunks::<OUT>().0;
+        let mut sums: [f32; OUT] = *cell(&self.bias, 0);
+        for up in Self::taps(out[0], input.rows) {
+            for across in Self::taps(out[1], input.columns) {
+                let (seen, first) = Self::tap(input, out, [up, across]);
+                for (value, weights) in seen.iter().zip(&weights[first..first + IN]) {
+                    add(&mut sums, weights, *value);
+                }
+            }
+        }
+        sums
+    }
+
+    /// Returns the sums of an output and of those to its right, all of whose columns are inside of the
+    /// image. One addition waits for another in the sums of one output, but not in those of several.
+    #[inline(always)]
+    fn block(&self, input: &Map<IN>, [row, column]: [usize; 2]) -> [[f32; OUT]; BLOCK] {
+        let weights = self.weights.as_chunks::<OUT>().0;
+        let mut sums: [[f32; OUT]; BLOCK] = [*cell(&self.bias, 0); BLOCK];
+        for up in Self::taps(row, input.rows) {
+            for across in 0..SIZE {
+                let [y, x] = Self::place([row, column], [up, across]);
+                let cells = &input.values.as_chunks::<IN>().0[y * input.columns + x..];
+                // Spelled out, because `array::from_fn` calls its closure here.
+                let seen = [&cells[0], &cells[STRIDE], &cells[2 * STRIDE], &cells[3 * STRIDE]];
+                let first = (up * SIZE + across) * IN;
+                for (i, weights) in weights[first..first + IN].iter().enumerate() {
+                    // By numbers: iterators over arrays would keep the sums out of registers.
+                    for k in 0..BLOCK {
+                        add(&mut sums[k], weights, seen[k][i]);
+                    }
+                }
+            }
+        }
+        sums
+    }
+
+    /// Returns the columns of outputs that see no column outside of an image.
+    fn full_columns(seen: usize, columns: usize) -> Range<usize> {
+        let is_full = |column: &usize| Self::taps(*column, seen) == (0..SIZE);
+        let first = (0..columns).find(is_full).unwrap_or(columns);
+        let end = (first..columns).find(|column| !is_full(column)).unwrap_or(columns);
+        first..end
     }
 
     /// Adds how the loss depends on the weights to `gradient`, and how it depends on the
@@ -274,7 +328,7 @@ mod tests {
 
     fn check<const STRIDE: usize, const DILATION: usize>() {
         let conv = conv::<3, 4, STRIDE, DILATION>();
-        for (rows, columns) in [(1, 1), (2, 7), (6, 5), (9, 4)] {
+        for (rows, columns) in [(1, 1), (2, 7), (6, 5), (9, 4), (5, 23)] {
             let input = input(rows, columns);
             let mut out = Map::<4>::new(rows.div_ceil(STRIDE), columns.div_ceil(STRIDE));
             let wanted: Vec<bool> = (0..out.rows * out.columns).map(|k| k % 3 != 1).collect();

@@ -37,8 +37,11 @@ pub struct SortedTile {
     entries: Vec<Entry>,
     /// Rows in which not all pixels show the same solid, by their numbers.
     rows: Vec<(u8, TileRow)>,
-    /// Pixels of these rows.
+    /// Pixels of these rows, row by row, and by their solids.
     pixels: Vec<Pixel>,
+    by_solid: Vec<Pixel>,
+    /// Pixels of each solid, and then the place of its next one.
+    places: Vec<u32>,
 }
 
 /// A batch by its solid.
@@ -50,7 +53,7 @@ pub struct Entry {
 }
 
 /// A pixel in a row that shows several solids.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 struct Pixel {
     solid: u32,
     /// Place of the row among those of its kind.
@@ -186,8 +189,8 @@ impl SortedTile {
 
     /// Makes batches of the pixels that were put aside, and sorts all of them.
     fn sort(&mut self) {
-        let mut pixels = std::mem::take(&mut self.pixels);
-        pixels.sort_unstable();
+        self.sort_pixels();
+        let pixels = std::mem::take(&mut self.by_solid);
         for same in pixels.chunk_by(|one, next| one.solid == next.solid) {
             for part in same.chunks(LANES) {
                 let rows = std::mem::take(&mut self.rows);
@@ -196,8 +199,27 @@ impl SortedTile {
                 self.keep_batch(part[0].solid);
             }
         }
-        self.pixels = pixels;
+        self.by_solid = pixels;
         self.entries.sort_unstable();
+    }
+
+    /// Sorts the pixels by their solids: there are few of these, and the pixels of each are in order.
+    fn sort_pixels(&mut self) {
+        let Self { pixels, by_solid, places, .. } = self;
+        let solids = pixels.iter().map(|pixel| pixel.solid as usize + 1).max().unwrap_or(0);
+        places.clear();
+        places.resize(solids, 0);
+        pixels.iter().for_each(|pixel| places[pixel.solid as usize] += 1);
+        let mut first = 0;
+        for place in places.iter_mut() {
+            first += std::mem::replace(place, first);
+        }
+        by_solid.resize(pixels.len(), Pixel::default());
+        for pixel in pixels.iter() {
+            let place = &mut places[pixel.solid as usize];
+            by_solid[*place as usize] = *pixel;
+            *place += 1;
+        }
     }
 }
 

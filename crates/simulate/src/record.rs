@@ -226,8 +226,8 @@ impl Recorder {
 
     fn depth(&mut self, at: Stamp, header: &Header, depth: &DepthImage) -> Result<(), WriteError> {
         let mut data = vec![0; 2 * depth.pixels().len()];
-        for (to, metres) in data.chunks_exact_mut(2).zip(depth.pixels()) {
-            to.copy_from_slice(&millimetres(*metres));
+        for (to, metres) in data.as_chunks_mut::<2>().0.iter_mut().zip(depth.pixels()) {
+            *to = millimetres(*metres).to_le_bytes();
         }
         let message = self.raw(header, "16UC1", 2, &data);
         self.log.send("/camera/aligned_depth_to_color/image_raw", at, &message)
@@ -298,10 +298,20 @@ fn jpeg(image: &RgbImage) -> Vec<u8> {
     out
 }
 
-/// Converts to millimetres; 0 is "no reading", as in REP 118.
-fn millimetres(depth_m: f32) -> [u8; 2] {
-    let millimetres = if depth_m.is_finite() { (1000.0 * depth_m).round() as u16 } else { 0 };
-    millimetres.to_le_bytes()
+/// Converts to millimetres, rounded and at most what 16 bits hold; 0 is "no reading", as in REP 118.
+/// Rounding by a function, or a cast that checks its range, would keep the loop over an image from
+/// becoming vector instructions.
+#[inline]
+fn millimetres(depth_m: f32) -> u16 {
+    // From this power of two on, the last bits of the float are the integer itself.
+    const WHOLE: f32 = 8_388_608.0;
+    let is_reading = (depth_m > 0.0) & (depth_m < f32::INFINITY);
+    let exact = if is_reading { 1000.0 * depth_m } else { 0.0 };
+    let exact = if exact < 65_535.0 { exact } else { 65_535.0 };
+    let near = exact + WHOLE - WHOLE;
+    let below = if near > exact { near - 1.0 } else { near };
+    let rounded = if exact - below >= 0.5 { below + 1.0 } else { below };
+    (rounded + WHOLE).to_bits() as u16
 }
 
 /// Returns static transforms to sensors from the frame of their poses.
@@ -412,4 +422,23 @@ fn joint(joint: &Joint) -> (String, TruthJoint) {
     let in_robot_m = <[f64; 3]>::from(joint.in_robot.coords).map(|m| rounded(m, 1e4));
     let px = joint.pixel.map(|pixel| [pixel.x, pixel.y].map(|px| rounded(px, 10.0)));
     (joint.name.into(), TruthJoint { in_robot_m, px, in_sight: joint.in_sight })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_depth_has_the_nearest_millimetre_and_none_is_zero() {
+        for steps in 0..700_000_u32 {
+            let depth_m = 1e-4 * steps as f32;
+            assert_eq!(millimetres(depth_m), (1000.0 * depth_m).round() as u16, "{depth_m}");
+        }
+        // Halves, the number below one, and what has no place.
+        let others = [0.0005, 0.0015, 0.000_499_999_97, 65.5345, 65.5355, 1e30, 0.0, -0.0, -2.0];
+        for depth_m in others {
+            assert_eq!(millimetres(depth_m), (1000.0 * depth_m).round() as u16, "{depth_m}");
+        }
+        assert_eq!([f32::NAN, f32::INFINITY].map(millimetres), [0; 2]);
+    }
 }

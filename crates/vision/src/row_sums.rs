@@ -152,16 +152,37 @@ fn reduced(depth: &DepthImage, scale: usize) -> Vec<u16> {
 
 /// Fills the empty pixels of a reduced row from one row of its blocks.
 fn fill_row(row: &mut [u16], depth: &[f32], scale: usize) {
-    let nearest = RowSums::MIN_DEPTH_M as f32;
-    for column in 0..scale {
-        for (out, block) in row.iter_mut().zip(depth.chunks_exact(scale)) {
-            let z = block[column];
-            let value = whole(RowSums::UNITS as f32 / z.max(nearest) + 0.5);
-            // No branches: the loop becomes vector instructions.
-            let is_wanted = (*out == 0) & (z >= nearest);
-            *out = if is_wanted { value } else { *out };
+    // Blocks of a known width become vector instructions; images have rarely others.
+    match scale {
+        1 => fill_from_blocks(row, depth.as_chunks::<1>().0),
+        2 => fill_from_blocks(row, depth.as_chunks::<2>().0),
+        3 => fill_from_blocks(row, depth.as_chunks::<3>().0),
+        4 => fill_from_blocks(row, depth.as_chunks::<4>().0),
+        _ => {
+            for (out, block) in row.iter_mut().zip(depth.chunks_exact(scale)) {
+                block.iter().for_each(|z| *out = filled(*out, *z));
+            }
         }
     }
+}
+
+/// Fills the empty pixels of a reduced row from one row of its blocks.
+fn fill_from_blocks<const SCALE: usize>(row: &mut [u16], depth: &[[f32; SCALE]]) {
+    for column in 0..SCALE {
+        for (out, block) in row.iter_mut().zip(depth) {
+            *out = filled(*out, block[column]);
+        }
+    }
+}
+
+/// Returns the value of a reduced pixel after another depth of its block. Without branches, so that
+/// loops become vector instructions.
+#[inline]
+fn filled(value: u16, depth_m: f32) -> u16 {
+    let nearest = RowSums::MIN_DEPTH_M as f32;
+    let seen = whole(RowSums::UNITS as f32 / depth_m.max(nearest) + 0.5);
+    let is_wanted = (value == 0) & (depth_m >= nearest);
+    if is_wanted { seen } else { value }
 }
 
 /// Returns the integer part of a number from 0 to below 2^16. A saturating cast would keep the loop

@@ -41,6 +41,7 @@ mod beams;
 mod config;
 mod detect;
 mod export;
+mod lanes;
 mod map;
 mod model;
 mod net;

@@ -1,8 +1,10 @@
+use multiversion::multiversion;
 use nalgebra::{Point2, Point3};
 use tagalong_core::{DepthImage, Derived, Frame, Result};
 use tagalong_geometry::{Camera, Lens};
 use tagalong_learn::conv::Map;
 
+use crate::lanes::{LANES, NONE, PixelRays, Projector, readings, whole};
 use crate::{Beams, Quarter};
 
 /// Columns of a depth image beyond which it is thinned out.
@@ -61,13 +63,16 @@ impl FloorMap {
     /// Computes the map of a depth image.
     pub fn new(camera: &Camera, depth: &DepthImage) -> Self {
         let mut map = Self::empty();
-        for_each_point(camera, depth, |point, area_m2| map.add_point(&point, area_m2));
+        add_points(&mut map, &PixelRays::new(camera), depth);
         map.flatten_surface();
-        map.add_voxels(|voxel| {
-            let pixel = camera.project(voxel)?;
-            let seen_m = depth.get(pixel.x.round() as i64, pixel.y.round() as i64)?;
-            Some([seen_m.into(), camera.depth_of(voxel)])
-        });
+        match Projector::new(camera, [depth.width(), depth.height()]) {
+            Some(projector) => add_voxels(&mut map, &projector, depth),
+            None => map.add_voxels(|voxel| {
+                let pixel = camera.project(voxel)?;
+                let seen_m = depth.get(pixel.x.round() as i64, pixel.y.round() as i64)?;
+                Some([seen_m.into(), camera.depth_of(voxel)])
+            }),
+        }
         map.in_view = widened(&map.in_view);
         map
     }
@@ -154,14 +159,21 @@ impl FloorMap {
                 let Some([seen_m, voxel_m]) = look(&Point3::new(floor.x, floor.y, height_m)) else {
                     continue;
                 };
-                self.in_view[cell] = true;
-                let behind_m = seen_m - voxel_m;
-                let voxel = self.coarse.at_mut(row, column);
-                // Neither comparison holds for a pixel without a reading.
-                voxel[2 * k] = f32::from(behind_m > MARGIN_M);
-                voxel[2 * k + 1] = f32::from(behind_m < -MARGIN_M && seen_m > f64::from(NEAREST_M));
+                self.see_voxel(cell, k, [seen_m, voxel_m]);
             }
         }
+    }
+
+    /// Compares a voxel of a coarse cell with the surface in its direction: how far away the surface
+    /// and the voxel are, m.
+    #[inline(always)]
+    fn see_voxel(&mut self, cell: usize, k: usize, [seen_m, voxel_m]: [f64; 2]) {
+        self.in_view[cell] = true;
+        let behind_m = seen_m - voxel_m;
+        let voxel = &mut self.coarse.values.as_chunks_mut::<{ Self::COARSE }>().0[cell];
+        // Neither comparison holds for a pixel without a reading.
+        voxel[2 * k] = f32::from(behind_m > MARGIN_M);
+        voxel[2 * k + 1] = f32::from(behind_m < -MARGIN_M && seen_m > f64::from(NEAREST_M));
     }
 }
 
@@ -175,24 +187,81 @@ impl Derived for FloorMap {
     }
 }
 
+/// Adds the points of a depth image, as [`FloorMap::add_point`] does one by one.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn add_points(map: &mut FloorMap, rays: &PixelRays<'_>, depth: &DepthImage) {
+    let side = 2.0 * FloorMap::CELLS as f64;
+    let cells = map.fine.values.as_chunks_mut::<{ FloorMap::FINE }>().0;
+    for y in 0..depth.height() {
+        for (number, part) in depth.row(y).chunks(LANES).enumerate() {
+            let points = rays.points([number * LANES, y], &readings(part, NEAREST_M));
+            let mut cell = [NONE; LANES];
+            let mut slab = [NONE; LANES];
+            for lane in 0..LANES {
+                let row = ((points.x[lane] - FIRST_X_M) / FINE_M).floor();
+                let column = ((points.y[lane] - FIRST_Y_M) / FINE_M).floor();
+                // No comparison holds without a reading.
+                let is_inside = (row >= 0.0)
+                    & (row < side)
+                    & (column >= 0.0)
+                    & (column < side)
+                    & (points.z[lane] < CEILING_M);
+                let number = whole(row * side + column);
+                cell[lane] = if is_inside { number } else { NONE };
+                let above = ((points.z[lane] - FLOOR_M) / SLAB_M).floor();
+                let has_slab = (above >= 0.0) & (above < FloorMap::SLABS as f64);
+                slab[lane] = if has_slab { whole(above) } else { NONE };
+            }
+            for lane in 0..LANES {
+                let Some(cell) = cells.get_mut(cell[lane] as usize) else { continue };
+                cell[FloorMap::SLABS] = cell[FloorMap::SLABS].max(0.5 * points.z[lane] as f32);
+                if slab[lane] != NONE {
+                    cell[slab[lane] as usize] += (points.area_m2[lane] * PER_CELL) as f32;
+                }
+            }
+        }
+    }
+}
+
+/// Compares voxels with the surfaces in their directions, as [`FloorMap::add_voxels`] does one by one.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn add_voxels(map: &mut FloorMap, projector: &Projector, depth: &DepthImage) {
+    for row in 0..FloorMap::CELLS {
+        for first in (0..FloorMap::CELLS).step_by(LANES) {
+            let x = FloorMap::centre(row, first).x;
+            let mut y = [0.0; LANES];
+            for (lane, y) in y.iter_mut().enumerate() {
+                *y = FloorMap::centre(row, first + lane).y;
+            }
+            for (k, height_m) in HEIGHTS_M.into_iter().enumerate() {
+                let voxels = projector.pixels(x, &y, height_m);
+                for lane in 0..LANES {
+                    let pixel = voxels.pixel[lane] as usize;
+                    let Some(seen_m) = depth.pixels().get(pixel) else { continue };
+                    let cell = row * FloorMap::CELLS + first + lane;
+                    map.see_voxel(cell, k, [f64::from(*seen_m), voxels.depth_m[lane]]);
+                }
+            }
+        }
+    }
+}
+
 /// Calls `see` with each point of a depth image in the robot frame, and with the area that its
 /// pixel covers, m².
+#[cfg(any(test, feature = "train"))]
 pub(crate) fn for_each_point(
     camera: &Camera,
     depth: &DepthImage,
     mut see: impl FnMut(Point3<f64>, f64),
 ) {
-    let pose = camera.robot_from_camera;
-    let turn = pose.rotation.to_rotation_matrix();
-    let origin = pose.translation.vector;
+    let rays = PixelRays::new(camera);
     for y in 0..depth.height() {
-        for (x, depth_m) in depth.row(y).iter().enumerate() {
-            // Also false for "no reading".
-            if *depth_m > NEAREST_M {
-                let depth_m = f64::from(*depth_m);
-                let ray = camera.ray(Point2::new(x as f64, y as f64));
-                let point = turn * ray * depth_m + origin;
-                see(point.into(), (depth_m / camera.focal_px()).powi(2));
+        for (number, part) in depth.row(y).chunks(LANES).enumerate() {
+            let depth_m = readings(part, NEAREST_M);
+            let points = rays.points([number * LANES, y], &depth_m);
+            for lane in (0..LANES).filter(|lane| !depth_m[*lane].is_nan()) {
+                let point = Point3::new(points.x[lane], points.y[lane], points.z[lane]);
+                see(point, points.area_m2[lane]);
             }
         }
     }
@@ -211,8 +280,11 @@ pub fn reduced(camera: &Camera, depth: &DepthImage) -> Option<(Camera, DepthImag
     let count = |size: usize| (size - first).div_ceil(step);
     let width = count(depth.width());
     let height = count(depth.height());
-    let image =
-        DepthImage::from_fn(width, height, |x, y| depth.row(first + y * step)[first + x * step]);
+    let mut image = DepthImage::filled(width, height, f32::NAN);
+    for (y, row) in image.pixels_mut().chunks_exact_mut(width.max(1)).enumerate() {
+        let from = depth.row(first + y * step)[first..].iter().step_by(step);
+        row.iter_mut().zip(from).for_each(|(to, depth_m)| *to = *depth_m);
+    }
     let mut lens = *lens;
     (lens.fx, lens.fy) = (lens.fx / by, lens.fy / by);
     (lens.cx, lens.cy) = ((lens.cx - first as f64) / by, (lens.cy - first as f64) / by);
@@ -301,6 +373,32 @@ mod tests {
         ];
         let [a, b] = [&a, &b].map(|map| map.fine.at(46, 64)[4]);
         assert!((a - b).abs() < 0.2, "{a} {b}");
+    }
+
+    /// A map of a scene with people, walls and holes, point by point and voxel by voxel.
+    #[test]
+    fn a_map_is_that_of_its_points_one_by_one() {
+        for distortion in [Distortion::None, Distortion::PlumbBob([0.05, 0.0, 0.001, 0.0, 0.0])] {
+            let lens = Pinhole { fx: 61.3, fy: 60.7, cx: 39.2, cy: 29.9, distortion };
+            let camera = Camera::mounted(lens, 83, 60, 1.15, 0.1, 0.03);
+            let depth = DepthImage::from_fn(83, 60, |x, y| match (x * 7 + y * 5) % 11 {
+                0 => f32::NAN,
+                1 => 0.05,
+                part => 0.4 + 0.5 * part as f32 + 0.01 * x as f32,
+            });
+            let mut slow = FloorMap::empty();
+            for_each_point(&camera, &depth, |point, area_m2| slow.add_point(&point, area_m2));
+            slow.flatten_surface();
+            slow.add_voxels(|voxel| {
+                let pixel = camera.project(voxel)?;
+                let seen_m = depth.get(pixel.x.round() as i64, pixel.y.round() as i64)?;
+                Some([seen_m.into(), camera.depth_of(voxel)])
+            });
+            slow.in_view = widened(&slow.in_view);
+            let map = FloorMap::new(&camera, &depth);
+            assert!(map == slow, "{distortion:?}");
+            assert!(map.coarse.values.iter().any(|value| *value > 0.0));
+        }
     }
 
     #[cfg(feature = "train")]

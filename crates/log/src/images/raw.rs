@@ -49,8 +49,11 @@ pub fn decode_raw(
         "mono8" | "8UC1" => Pixels::Grey(rows.plane(|[v]: [u8; 1]| v)),
         "32FC1" => {
             let unit = depth_unit_m.unwrap_or(1.0) as f32;
-            let read = if big { f32::from_be_bytes } else { f32::from_le_bytes };
-            Pixels::Depth(rows.plane(|p: [u8; 4]| metres_of_float(read(p), unit)))
+            Pixels::Depth(if big {
+                rows.plane(|p: [u8; 4]| metres_of_float(f32::from_be_bytes(p), unit))
+            } else {
+                rows.plane(|p: [u8; 4]| metres_of_float(f32::from_le_bytes(p), unit))
+            })
         }
         // 65535 becomes 255, as in cv_bridge.
         "mono16" if depth_unit_m.is_none() => {
@@ -59,8 +62,13 @@ pub fn decode_raw(
         }
         _ => {
             let unit = depth_unit_m.unwrap_or(0.001) as f32;
-            let read = if big { u16::from_be_bytes } else { u16::from_le_bytes };
-            Pixels::Depth(rows.plane(|p: [u8; 2]| metres(read(p), unit)))
+            // The order of bytes is known in each loop: one that asks a function for it is no
+            // vector instruction.
+            Pixels::Depth(if big {
+                rows.plane(|p: [u8; 2]| metres(u16::from_be_bytes(p), unit))
+            } else {
+                rows.plane(|p: [u8; 2]| metres(u16::from_le_bytes(p), unit))
+            })
         }
     };
     Ok(pixels)
