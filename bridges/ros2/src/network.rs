@@ -35,6 +35,14 @@ const ANSWERS: usize = 10;
 /// Number of events that are kept for subscribers that missed them.
 const EVENTS: usize = 16;
 
+/// Types of the topics that each node has, this one among them: none of them is of a robot.
+const OF_EVERY_NODE: [&str; 4] = [
+    "builtin_interfaces/msg/Time",
+    "lifecycle_msgs/msg/TransitionEvent",
+    "rcl_interfaces/msg/ParameterEvent",
+    "rosgraph_msgs/msg/Clock",
+];
+
 /// The node of the bridge.
 pub(crate) struct Network {
     node: Node,
@@ -110,13 +118,13 @@ impl Network {
         Ok(Self { node, context, spinner: Some(spinner) })
     }
 
-    /// Returns all discovered topics with their message types.
+    /// Returns all discovered topics that a robot may have, with their message types.
     pub(crate) fn topics(&self) -> Vec<(String, String)> {
         let found = self.context.discovered_topics();
         let named = found.iter().filter_map(|topic| {
             Some((ros_topic(&topic.name)?.to_owned(), ros_type(&topic.type_name)?))
         });
-        named.collect()
+        named.filter(|(_, kind)| !OF_EVERY_NODE.contains(&kind.as_str())).collect()
     }
 
     /// Puts the messages of a topic into the inbox; returns `None` for a type without use.
