@@ -1,6 +1,6 @@
 //! The list of published systems.
 
-use crate::{System, joint_particle, laser, omni_appearance, rgbd_compressive, stereo};
+use crate::{System, joint_particle, laser, omni_appearance, planners, rgbd_compressive, stereo};
 
 /// All systems, in the order of the papers.
 pub const SYSTEMS: &[System] = &[
@@ -10,6 +10,7 @@ pub const SYSTEMS: &[System] = &[
     stereo::STEREO_SVM_EKF,
     omni_appearance::SYSTEM,
     laser::SYSTEM,
+    planners::SYSTEM,
 ];
 
 /// Returns the system of this name.

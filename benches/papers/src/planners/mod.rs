@@ -5,12 +5,52 @@
 //! at 7284e8e, MIT). There a planner commands the robot directly; here the command limiter and the
 //! collision monitor of the config come after it, as after every controller.
 
+mod avoidable;
 mod dynamic_window;
 mod obstacles;
 mod quarry;
+mod rides;
 mod social_force;
+mod table;
 
 use tagalong_config::Registry;
+
+use crate::{Experiment, System};
+
+/// The benchmark: our controllers beside its planners, on the same seeds.
+pub const SYSTEM: System = System {
+    name: "follow-bench",
+    about: "following among people: our controllers beside two planners of Follow-Bench",
+    experiments: &[
+        Experiment {
+            name: "told",
+            about: "told where people are, as the benchmark has it",
+            run: table::told,
+        },
+        Experiment { name: "laser", about: "people by the laser scanner", run: table::laser },
+        Experiment { name: "depth", about: "people by depth images", run: table::depth },
+        Experiment {
+            name: "walk-told",
+            about: "told, behind a target that the robot can keep up with",
+            run: table::walk_told,
+        },
+        Experiment {
+            name: "walk-laser",
+            about: "people by the laser scanner, behind the same target",
+            run: table::walk_laser,
+        },
+        Experiment {
+            name: "walk-depth",
+            about: "people by depth images, behind the same target",
+            run: table::walk_depth,
+        },
+        Experiment {
+            name: "avoidable",
+            about: "times in the private zone of others, ridden again with a robot that stopped earlier",
+            run: avoidable::avoidable,
+        },
+    ],
+};
 
 /// Registers the planners.
 pub(crate) fn register(registry: &mut Registry) {

@@ -23,7 +23,7 @@ pub struct ClearFollow {
 
 impl Controller for ClearFollow {
     fn inputs(&self) -> Inputs {
-        Inputs::NONE.accept(Input::Depth)
+        Inputs::NONE.accept(Input::Depth).accept(Input::Laser)
     }
 
     fn command(&mut self, scene: &Scene<'_>) -> Twist {
@@ -69,11 +69,14 @@ impl ClearFollow {
         let is_thing =
             |at: &Point2<f64>| people.iter().all(|p| nalgebra::distance(p, at) > PERSON_M);
         self.around.move_along(&scene.frame.motion, self.config.memory_s);
+        let mut look = Look::new();
         if let Ok(depth) = scene.frame.depth() {
-            let mut look = Look::new();
             look.add_depth(&scene.frame.camera, depth, self.config.heights_m, is_thing);
-            self.around.add_look(&look);
         }
+        for scan in scene.frame.scans() {
+            look.add_scan(scan, is_thing);
+        }
+        self.around.add_look(&look);
     }
 
     fn steer(&mut self, scene: &Scene<'_>, dt: f64) -> Option<Twist> {

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry2, Point2, Vector2};
+use nalgebra::{Isometry2, Point2, Point3, Vector2};
 use proptest::prelude::*;
 use tagalong_conformance::target;
 use tagalong_core::{
-    Controller, DepthImage, DiffDrive, EgoMotion, Frame, Images, Scene, Stamp, Track, Twist,
-    WheelSpeeds,
+    Controller, DepthImage, DiffDrive, EgoMotion, Frame, Images, LaserScan, Scene, Stamp, Track,
+    Twist, WheelSpeeds,
 };
 use tagalong_geometry::{Camera, Distortion, Pinhole};
 
@@ -90,6 +90,26 @@ fn what_stands_in_the_way_is_gone_round_and_a_wall_stops_it() {
         settled(&DepthImage::from_fn(40, 30, |x, _| if (17..20).contains(&x) { 1.0 } else { 6.0 }))
             .unwrap();
     assert!((round.left - round.right).abs() > 0.05 && round.left + round.right > 0.1, "{round:?}");
+}
+
+/// A robot with a laser scanner alone, which sees a post to the left of the middle, and the followed person.
+#[test]
+fn what_a_laser_scanner_sees_is_gone_round_and_the_person_is_no_thing() {
+    let person = target(4.0, 0.0, Vector2::zeros());
+    let settled = |points: &[[f64; 2]]| {
+        let mut controller = ClearFollow::new(prompt()).unwrap();
+        let points: Vec<_> = points.iter().map(|[x, y]| Point3::new(*x, *y, 0.2)).collect();
+        let motion = EgoMotion::at_rest(0.1);
+        let frame = Frame::new(1, Stamp::default(), camera(), motion, Images::default())
+            .with_laser(Some(LaserScan::of_points(points)));
+        let tracks = std::slice::from_ref(&person);
+        let scene = Scene::new(&frame, tracks, WHEELS, MAX_MPS).with_target(Some(&person));
+        (0..30).map(|_| controller.command(&scene)).last().unwrap()
+    };
+    let free = settled(&[[3.8, 0.05], [3.8, -0.05]]);
+    assert!(free.angular_rps == 0.0 && free.linear_mps > 0.8, "{free:?}");
+    let round = settled(&[[1.0, 0.05], [1.0, 0.1]]);
+    assert!(round.angular_rps < -0.1 && round.linear_mps > 0.1, "{round:?}");
 }
 
 #[test]
