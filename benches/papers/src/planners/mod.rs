@@ -7,7 +7,7 @@
 
 mod dynamic_window;
 mod obstacles;
-mod quarry;
+mod planner;
 mod social_force;
 
 use tagalong_config::Registry;
