@@ -9,11 +9,12 @@ use tagalong_app::outcome::{Ended, Failure, Outcome, make_folder, print, say, wr
 use tagalong_app::serialize::to_json;
 use tagalong_app::threads::threads;
 use tagalong_config::Registry;
+use tagalong_report::Table;
 use tagalong_sim::Split;
 
-use crate::{
-    Experiment, ExperimentFindings, Lab, Progress, SYSTEMS, SimulatedScenes, System, Table, system,
-};
+use crate::findings::{Experiment, ExperimentFindings, System};
+use crate::lab::{Lab, Progress, SimulatedScenes};
+use crate::systems::{SYSTEMS, system};
 
 /// Arguments of `tagalong-papers reproduce`.
 #[derive(Args, Debug)]
@@ -132,8 +133,7 @@ fn list(format: TableFormat) -> Outcome {
 /// Returns the requested experiments, in the order of the system.
 fn chosen(system: &System, only: &[String]) -> Result<Vec<&'static Experiment>, Failure> {
     let all = system.experiments;
-    let is_there = |name: &&String| all.iter().any(|experiment| experiment.name == **name);
-    if let Some(name) = only.iter().find(|name| !is_there(name)) {
+    if let Some(name) = only.iter().find(|name| all.iter().all(|known| known.name != **name)) {
         return Err(unknown(name, all.iter().map(|experiment| experiment.name)));
     }
     Ok(all.iter().filter(|e| only.is_empty() || only.iter().any(|name| name == e.name)).collect())
@@ -201,7 +201,7 @@ impl Progress for Bar {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Findings;
+    use crate::findings::{Findings, Picture};
 
     fn system() -> &'static System {
         &SYSTEMS[0]
@@ -244,7 +244,7 @@ mod tests {
     fn files_hold_tables_and_pictures() {
         let folder = tempfile::tempdir().unwrap();
         let table = Table { title: "A table".into(), ..Table::default() };
-        let picture = crate::Picture { name: "plot".into(), svg: "<svg/>".into() };
+        let picture = Picture { name: "plot".into(), svg: "<svg/>".into() };
         let findings = Findings { tables: vec![table], pictures: vec![picture] };
         let found = ExperimentFindings { experiment: "one", simulated: Vec::new(), findings };
         write(folder.path(), &[found]).unwrap();

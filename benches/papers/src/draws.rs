@@ -3,8 +3,7 @@
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use tagalong_eval::{Scores, Tally, draws_interval, mean_interval};
 use tagalong_math::{Gain, mean_and_deviation, paired_gain};
-
-use crate::Cell;
+use tagalong_report::Cell;
 
 /// Returns the mean; 0 of no values.
 pub(crate) fn mean(values: &[f64]) -> f64 {

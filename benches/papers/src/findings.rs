@@ -1,8 +1,8 @@
 use serde::Serialize;
+use tagalong_report::Table;
 use tagalong_sim::Seeds;
 
-use crate::lab::SimulatedScene;
-use crate::{Lab, ReproduceError, Table};
+use crate::lab::{Lab, ReproduceError, SimulatedScene};
 
 /// A published system.
 #[derive(Clone, Copy, Debug)]
@@ -100,9 +100,11 @@ impl From<Table> for Findings {
 
 #[cfg(test)]
 mod tests {
+    use tagalong_report::{Cell, Row};
     use tagalong_sim::Split;
 
     use super::*;
+    use crate::lab::testing::lab;
 
     #[test]
     fn scenes_with_the_same_seeds_are_named_together() {
@@ -120,8 +122,8 @@ mod tests {
     /// Runs an experiment with one table of seeds, and an empty one.
     fn drawing(lab: &Lab) -> Result<Findings, ReproduceError> {
         let scenes = lab.scenes("turntable", &[], lab.seeds(2))?;
-        let cells = scenes.iter().map(|scene| crate::Cell::number(scene.seed as f64, 0)).collect();
-        let rows = vec![crate::Row::ours("seeds", cells)];
+        let cells = scenes.iter().map(|scene| Cell::number(scene.seed as f64, 0)).collect();
+        let rows = vec![Row::ours("seeds", cells)];
         let tables = vec![Table { rows, ..Table::default() }, Table::default()];
         Ok(Findings { tables, pictures: Vec::new() })
     }
@@ -129,7 +131,7 @@ mod tests {
     #[test]
     fn every_table_of_an_experiment_names_the_seeds_of_its_draws() {
         let registry = tagalong_config::Registry::default();
-        let mut lab = crate::lab::testing::lab(&registry, false, None);
+        let mut lab = lab(&registry, false, None);
         let experiment = Experiment { name: "draws", about: "", run: drawing };
         let mut find = |first_seed| {
             lab.first_seed = first_seed;

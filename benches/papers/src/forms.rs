@@ -1,17 +1,16 @@
-//! The first table of each published system: the figures of its paper, the method as printed, the
+//! The first table of a published system: the figures of its paper, the method as printed, the
 //! method with its errors corrected, and ours, side by side; real rooms first.
 
 use tagalong_eval::{Scores, Similarity, Tally};
+use tagalong_report::{Cell, Row, Table};
 use tagalong_sim::Scene;
 use tagalong_trials::{Contender, Judge, Trial, TrialError};
 
 use crate::draws::{over_draws, pooled};
+use crate::findings::{Experiment, Findings};
+use crate::lab::{Lab, ReproduceError};
 use crate::real::{self, NOT_TRAINED_ON};
 use crate::variant::{with_values, without_table};
-use crate::{
-    Cell, Experiment, Findings, Lab, ReproduceError, Row, Table, joint_particle, omni_appearance,
-    rgbd_compressive, stereo,
-};
 
 /// Names of the forms, in the order of [`Forms::configs`].
 const FORMS: [&str; 3] = ["as printed", "corrected", "ours"];
@@ -20,40 +19,40 @@ type Headlines = Vec<Vec<f64>>;
 
 /// The forms of a system, and how they are compared.
 pub(crate) struct Forms {
-    paper: &'static str,
+    pub(crate) paper: &'static str,
     /// Shipped configs: as printed, corrected, and ours.
-    configs: [&'static str; 3],
+    pub(crate) configs: [&'static str; 3],
     /// Returns the configs for the simulated scenes.
-    contenders: fn(&Lab, &[&str]) -> Result<Vec<Contender>, ReproduceError>,
-    judge: Judge,
+    pub(crate) contenders: fn(&Lab, &[&str]) -> Result<Vec<Contender>, ReproduceError>,
+    pub(crate) judge: Judge,
     /// False if no annotated real log has the sensor.
-    has_real: bool,
+    pub(crate) has_real: bool,
     /// Name of the scene of the paper, and its draws.
-    scene: &'static str,
-    scenes: fn(&Lab) -> Result<Vec<Scene>, ReproduceError>,
-    headline: Headline,
+    pub(crate) scene: &'static str,
+    pub(crate) scenes: fn(&Lab) -> Result<Vec<Scene>, ReproduceError>,
+    pub(crate) headline: Headline,
     /// Another reading of the printed form, beside it.
-    otherwise: Option<Reading>,
-    notes: &'static [&'static str],
+    pub(crate) otherwise: Option<Reading>,
+    pub(crate) notes: &'static [&'static str],
 }
 
 /// A reading of the printed form that the text of the paper allows as well.
-struct Reading {
+pub(crate) struct Reading {
     /// Difference in words.
-    words: &'static str,
+    pub(crate) words: &'static str,
     /// Values, TOML, at dotted keys of the printed form.
-    values: &'static [(&'static str, &'static str)],
+    pub(crate) values: &'static [(&'static str, &'static str)],
 }
 
 /// The figure that a paper states of its system.
-struct Headline {
+pub(crate) struct Headline {
     /// Title of the column.
-    column: &'static str,
-    published: f64,
-    digits: usize,
+    pub(crate) column: &'static str,
+    pub(crate) published: f64,
+    pub(crate) digits: usize,
     /// The largest value that it can have; the least is 0.
-    most: f64,
-    of: fn(Trial) -> Result<Headlines, TrialError>,
+    pub(crate) most: f64,
+    pub(crate) of: fn(Trial) -> Result<Headlines, TrialError>,
 }
 
 /// Results of one form on one simulated draw or one real log.
@@ -64,138 +63,15 @@ struct Form {
     headline: Vec<f64>,
 }
 
-const ON_THE_FLOOR: Judge =
+pub(crate) const ON_THE_FLOOR: Judge =
     Judge { similarity: Similarity::Metres, max_range_m: 6.0, coasting: false };
-const ON_A_PAIR: &str = "Real logs have colour and depth images instead of a pair: there the \
-    pipelines run without their `[stereo]` stage, with settings for the scatter of stereo.";
-const VERIFIED: &str = "Trained on: `color-texture` and `body-net` of the last row on simulated \
-    rooms, photographs and the logs `filinha` and `um`.";
-
-const OF_P1: Forms = Forms {
-    paper: "P1",
-    configs: ["stereo-ekf-as-printed", "stereo-ekf", "stereo-verified"],
-    contenders: shipped,
-    judge: ON_THE_FLOOR,
-    has_real: true,
-    scene: "square-walk",
-    scenes: stereo::walks,
-    headline: Headline {
-        column: "frame, ms",
-        published: 70.0,
-        digits: 0,
-        most: f64::INFINITY,
-        of: frame_ms,
-    },
-    otherwise: None,
-    notes: &[
-        ON_A_PAIR,
-        VERIFIED,
-        "The paper shows rides in pictures; its only figure is the time of a frame, on a Core2Duo of \
-         2.6 GHz. Ours is processor time, the matching of the pair included.",
-    ],
-};
-
-const OF_P2: Forms = Forms {
-    paper: "P2",
-    configs: ["rgbd-compressive-as-printed", "rgbd-compressive", "rgbd-ekf"],
-    contenders: shipped,
-    judge: rgbd_compressive::JUDGE,
-    has_real: true,
-    otherwise: None,
-    scene: "static-high",
-    scenes: rgbd_compressive::static_scenes,
-    headline: Headline {
-        column: "frames/s",
-        published: 23.8,
-        digits: 0,
-        most: f64::INFINITY,
-        of: frames_a_second,
-    },
-    notes: &[
-        "Trained on: the detectors of faces and upper bodies on photographs alone. A threshold of \
-         the last row was chosen while looking at real logs.",
-        "The paper's curves of the miss rate are pictures (next table); frames a second are of \
-         processor time, and its processor is an older one.",
-    ],
-};
-
-const OF_P3: Forms = Forms {
-    paper: "P3",
-    configs: ["joint-particle-as-printed", "joint-particle-kde50", "stereo-particle"],
-    contenders: joint_particle::on_a_pair,
-    judge: ON_THE_FLOOR,
-    has_real: true,
-    scene: "crossing-parallel",
-    scenes: joint_particle::crossings,
-    headline: Headline {
-        column: "success across, %",
-        published: 97.1,
-        digits: 0,
-        most: 100.0,
-        of: joint_particle::successes,
-    },
-    otherwise: Some(Reading {
-        words: "one window for all scenes, no ConDensation",
-        values: &joint_particle::OTHER_READING,
-    }),
-    notes: &[
-        "Read otherwise: the paper prints neither the window in which it compares images nor its \
-         filter. As printed has a window around the people of each scene and OpenCV's \
-         ConDensation; read otherwise is the same, misprints included, with the whole image as the \
-         window of all scenes of a frame, and resampling that reports what was weighed instead of \
-         what it predicts.",
-        ON_A_PAIR,
-        VERIFIED,
-        "Success as in the next table; published is method (c) with 50 particles, over 140 \
-         crossings.",
-    ],
-};
-
-const OF_P4: Forms = Forms {
-    paper: "P4",
-    configs: ["stereo-svm-ekf-as-printed", "stereo-svm-ekf", "stereo-verified"],
-    headline: Headline {
-        column: "walker, frame of the start, m",
-        published: 0.125,
-        digits: 3,
-        most: f64::INFINITY,
-        of: stereo::walker_errors_m,
-    },
-    notes: &[
-        ON_A_PAIR,
-        "Trained on: the verifier as printed on simulated rooms, `svm-patch`, `color-texture` and \
-         `body-net` also on photographs and the logs `filinha` and `um`.",
-        "The headline is the mean error of Fig. 11, of one walk in the paper, predicted places \
-         and the drift of the wheels included; here the mean over walks.",
-    ],
-    ..OF_P1
-};
-
-const OF_P5: Forms = Forms {
-    paper: "P5",
-    configs: ["omni-appearance-as-printed", "omni-appearance", "omni-rich"],
-    contenders: shipped,
-    judge: ON_THE_FLOOR,
-    has_real: false,
-    scene: "omni-room",
-    scenes: omni_appearance::rooms,
-    headline: Headline {
-        column: "error of all answers, m",
-        published: 0.145,
-        digits: 3,
-        most: f64::INFINITY,
-        of: omni_appearance::answers_m,
-    },
-    otherwise: None,
-    notes: &[
-        "No real log of a conical mirror is at hand, so the real columns are empty.",
-        "The headline is section 6.2's, appearance model and Kalman filter in one room; here the \
-         mean over rooms, in none of which the models were trained.",
-    ],
-};
+pub(crate) const ON_A_PAIR: &str = "Real logs have colour and depth images instead of a pair: \
+    there the pipelines run without their `[stereo]` stage, with settings for the scatter of stereo.";
+pub(crate) const VERIFIED: &str = "Trained on: `color-texture` and `body-net` of the last row on \
+    simulated rooms, photographs and the logs `filinha` and `um`.";
 
 /// Returns the shipped configs.
-fn shipped(lab: &Lab, names: &[&str]) -> Result<Vec<Contender>, ReproduceError> {
+pub(crate) fn shipped(lab: &Lab, names: &[&str]) -> Result<Vec<Contender>, ReproduceError> {
     lab.contenders(names)
 }
 
@@ -204,33 +80,9 @@ pub(crate) const fn experiment(run: fn(&Lab) -> Result<Findings, ReproduceError>
     Experiment { name: "forms", about: "published, as printed, corrected and ours", run }
 }
 
-/// Compares the forms of P1.
-pub(crate) fn of_p1(lab: &Lab) -> Result<Findings, ReproduceError> {
-    OF_P1.compare(lab)
-}
-
-/// Compares the forms of P2.
-pub(crate) fn of_p2(lab: &Lab) -> Result<Findings, ReproduceError> {
-    OF_P2.compare(lab)
-}
-
-/// Compares the forms of P3.
-pub(crate) fn of_p3(lab: &Lab) -> Result<Findings, ReproduceError> {
-    OF_P3.compare(lab)
-}
-
-/// Compares the forms of P4.
-pub(crate) fn of_p4(lab: &Lab) -> Result<Findings, ReproduceError> {
-    OF_P4.compare(lab)
-}
-
-/// Compares the forms of P5.
-pub(crate) fn of_p5(lab: &Lab) -> Result<Findings, ReproduceError> {
-    OF_P5.compare(lab)
-}
-
 impl Forms {
-    fn compare(&self, lab: &Lab) -> Result<Findings, ReproduceError> {
+    /// Runs the forms on real logs and simulated scenes, and returns their table.
+    pub(crate) fn compare(&self, lab: &Lab) -> Result<Findings, ReproduceError> {
         let real = if self.has_real { self.real_logs(lab)? } else { Vec::new() };
         let scenes = (self.scenes)(lab)?;
         let contenders = self.with_otherwise((self.contenders)(lab, &self.configs)?)?;
@@ -345,8 +197,8 @@ impl Forms {
 
 /// Returns the cells of one form.
 fn cells(at: usize, real: &[Vec<Form>], simulated: &[Vec<Form>], headline: &Headline) -> Vec<Cell> {
-    let tallies = |of: &[Vec<Form>]| of.iter().map(|forms| forms[at].tally.clone()).collect();
-    let (logs, draws): (Vec<Tally>, Vec<Tally>) = (tallies(real), tallies(simulated));
+    let [logs, draws]: [Vec<Tally>; 2] =
+        [real, simulated].map(|of| of.iter().map(|forms| forms[at].tally.clone()).collect());
     // Three rooms bear no interval.
     let real = |score: fn(&Scores) -> Option<f64>| {
         if logs.is_empty() {
@@ -370,24 +222,18 @@ fn cells(at: usize, real: &[Vec<Form>], simulated: &[Vec<Form>], headline: &Head
     ]
 }
 
-/// Returns the processor time of a frame, ms.
-fn frame_ms(trial: Trial) -> Result<Headlines, TrialError> {
-    Ok(trial.runs.iter().map(|run| vec![run.worked_ms / run.reports.len() as f64]).collect())
-}
-
-fn frames_a_second(trial: Trial) -> Result<Headlines, TrialError> {
-    Ok(trial.runs.iter().map(|run| vec![1e3 * run.reports.len() as f64 / run.worked_ms]).collect())
-}
-
 #[cfg(test)]
 mod tests {
     use tagalong_config::Registry;
     use tagalong_eval::Clear;
 
     use super::*;
+    use crate::joint_particle::OF_P3;
     use crate::lab::testing::lab;
+    use crate::omni_appearance::OF_P5;
+    use crate::rgbd_compressive::OF_P2;
+    use crate::stereo::{OF_P1, OF_P4};
     use crate::variant::parsed;
-    use crate::{SYSTEMS, system};
 
     const ALL: [&Forms; 5] = [&OF_P1, &OF_P2, &OF_P3, &OF_P4, &OF_P5];
 
@@ -406,13 +252,6 @@ mod tests {
         }
 
         forms.map(form).into()
-    }
-
-    #[test]
-    fn the_forms_of_each_paper_are_its_first_table() {
-        for name in SYSTEMS.iter().map(|system| system.name).filter(|name| *name != "laser") {
-            assert_eq!(system(name).unwrap().experiments[0].name, "forms", "{name}");
-        }
     }
 
     #[test]

@@ -2,9 +2,11 @@
 //! published results of SORT with the same boxes.
 
 use tagalong_eval::Tally;
+use tagalong_report::{Cell, Row, Table};
 use tagalong_trials::{Contender, GivenSequence, for_given_boxes};
 
-use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
+use crate::findings::Findings;
+use crate::lab::{Lab, ReproduceError};
 
 /// Name of the config.
 const RECORDED: &str = "recorded";
@@ -45,12 +47,11 @@ pub(crate) fn given(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
     let config = whole_bodies(lab)?;
     let sequences = sequences(lab)?;
     lab.progress.begin(sequences.len(), "sequences of MOT15");
-    let track = |given: &GivenSequence| {
-        let tracked = Tracked::new(given, lab, &config);
+    let mut tracked = Vec::new();
+    for given in &sequences {
+        tracked.push(Tracked::new(given, lab, &config)?);
         lab.progress.step();
-        tracked
-    };
-    let tracked = sequences.iter().map(track).collect::<Result<Vec<Tracked>, _>>()?;
+    }
     let mut rows = Vec::new();
     for one in &tracked {
         rows.extend(mota_of(&one.name).map(|mota| published(&one.name, mota)));

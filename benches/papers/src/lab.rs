@@ -1,3 +1,4 @@
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
@@ -33,6 +34,18 @@ pub enum ReproduceError {
     /// Any other failure.
     #[error("{0}")]
     Other(String),
+}
+
+impl ReproduceError {
+    /// Returns another error as one of an experiment.
+    pub(crate) fn other(error: impl ToString) -> Self {
+        Self::Other(error.to_string())
+    }
+
+    /// Returns another error, with the name of the log or config that has it.
+    pub(crate) fn of(name: &str, error: impl Display) -> Self {
+        Self::Other(format!("{name}: {error}"))
+    }
 }
 
 /// Receives the progress of an experiment.
@@ -138,9 +151,7 @@ impl Lab<'_> {
         let text = read(&path)?;
         let set: Vec<(String, String)> =
             set.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
-        let seeds = split
-            .seeds(self.first_seed, seeds)
-            .map_err(|error| ReproduceError::Other(error.to_string()))?;
+        let seeds = split.seeds(self.first_seed, seeds).map_err(ReproduceError::other)?;
         self.simulated.add(SimulatedScene { scene: name.to_owned(), seeds });
         seeds
             .numbers()

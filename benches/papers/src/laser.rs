@@ -9,9 +9,10 @@ use tagalong_eval::formats::floor::{self, Row as TruthRow};
 use tagalong_eval::{FloorClear, FloorPoint, FloorScan, FloorTally};
 use tagalong_log::{FrameSource, InputSettings, Limits};
 use tagalong_pipeline::FrameReport;
+use tagalong_report::{Cell, Row, Table};
 
-use crate::lab::read;
-use crate::{Cell, Experiment, Findings, Lab, ReproduceError, Row, System, Table};
+use crate::findings::{Experiment, Findings, System};
+use crate::lab::{Lab, ReproduceError, read};
 
 /// The leg tracker benchmark.
 pub const SYSTEM: System = System {
@@ -150,9 +151,8 @@ fn following(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
         ],
         &tracked,
     );
-    let recall = |valid: f64| 100.0 * valid / 6179.0;
     table.rows.extend(FOLLOWING_PUBLISHED.map(|(name, [valid, switches, misses, motp])| {
-        published(name, figures([6179.0, valid, switches, misses, recall(valid), motp]))
+        published(name, figures([6179.0, valid, switches, misses, 100.0 * valid / 6179.0, motp]))
     }));
     table.notes.extend(tracked.iter().filter(|tracked| tracked.coasting_s == 0.0).map(|tracked| {
         let first = tracked.first.map_or("never".into(), |scan| {
@@ -232,17 +232,17 @@ impl Log {
         truth: &BTreeMap<u32, Vec<TruthRow>>,
         config: &str,
     ) -> Result<[Counted; COASTING_S.len()], ReproduceError> {
-        let failed = |error: String| ReproduceError::Other(format!("{}: {error}", self.name));
         let mut pipeline = lab.contender(config)?.pipeline(lab.registry, 1)?;
         let input = InputSettings::default();
         let limits = Limits::default();
         let mut source = FrameSource::open(log, &input, &limits, pipeline.inputs())
-            .map_err(|error| failed(error.to_string()))?;
+            .map_err(|error| ReproduceError::of(self.name, error))?;
         let mut tallies = COASTING_S.map(|coasting_s| (coasting_s, FloorTally::new(CUT_M), None));
         let mut number = 0;
         while let Some(item) = source.next_frame() {
-            let report = pipeline.step(&item.frame).map_err(|error| failed(error.to_string()))?;
-            let scan = item.frame.scan().map_err(|error| failed(error.to_string()))?;
+            let report =
+                pipeline.step(&item.frame).map_err(|error| ReproduceError::of(self.name, error))?;
+            let scan = item.frame.scan().map_err(|error| ReproduceError::of(self.name, error))?;
             let people = truth.get(&number).map_or(&[][..], Vec::as_slice);
             for (coasting_s, tally, first) in &mut tallies {
                 let scan = self.scan(people, &report, &scan.robot_from_scanner, *coasting_s);
@@ -368,7 +368,7 @@ impl Log {
 fn truth(path: &Path) -> Result<BTreeMap<u32, Vec<TruthRow>>, ReproduceError> {
     let rows = floor::parse(&read(path)?, &path.display().to_string());
     let mut truth: BTreeMap<u32, Vec<TruthRow>> = BTreeMap::new();
-    for row in rows.map_err(|error| ReproduceError::Other(error.to_string()))? {
+    for row in rows.map_err(ReproduceError::other)? {
         truth.entry(row.scan).or_default().push(row);
     }
     Ok(truth)

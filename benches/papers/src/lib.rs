@@ -45,4 +45,3 @@ pub fn register(registry: &mut Registry) {
 pub use findings::{Experiment, ExperimentFindings, Findings, Picture, System};
 pub use lab::{Lab, Progress, ReproduceError, SimulatedScene, SimulatedScenes};
 pub use systems::{SYSTEMS, system};
-pub use tagalong_report::{Cell, Row, Table};

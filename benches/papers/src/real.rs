@@ -12,9 +12,8 @@ use tagalong_pipeline::Pipeline;
 use tagalong_sim::Truth;
 use tagalong_trials::{Contender, Moment, Run, Trial};
 
-use crate::lab::read;
+use crate::lab::{Lab, ReproduceError, read};
 use crate::variant::parsed;
-use crate::{Lab, ReproduceError};
 
 /// Logs in which no shipped verifier was trained, ...
 pub(crate) const NOT_TRAINED_ON: [&str; 3] = ["corredor1-camera1", "lab2-camera1", "lab2-camera2"];
@@ -61,16 +60,14 @@ pub(crate) fn trial(
     if !truth.exists() {
         return Ok(None);
     }
-    let failed =
-        |error: &dyn ToString| ReproduceError::Other(format!("{log}: {}", error.to_string()));
     let rows = people::parse(&read(&truth)?, &truth.display().to_string());
-    let rows = rows.map_err(|error| failed(&error))?;
+    let rows = rows.map_err(|error| ReproduceError::of(log, error))?;
     let mut people: BTreeMap<u64, Vec<Annotated>> = BTreeMap::new();
     rows.into_iter().for_each(|row| people.entry(u64::from(row.frame)).or_default().push(row));
     let inputs = Inputs::NONE.require(Input::Colour).require(Input::Depth);
     let path = path.with_extension("mcap");
     let source = FrameSource::open(&path, &InputSettings::default(), &Limits::default(), inputs);
-    let mut source = source.map_err(|error| failed(&error))?;
+    let mut source = source.map_err(|error| ReproduceError::of(log, error))?;
     let pipelines = contenders.iter().map(|contender| contender.pipeline(lab.registry, 1));
     let mut pipelines = pipelines.collect::<Result<Vec<Pipeline>, _>>()?;
     let mut runs: Vec<Run> = contenders.iter().map(run).collect();
@@ -78,7 +75,8 @@ pub(crate) fn trial(
     let mut camera = None;
     while let Some(item) = source.next_frame() {
         for (pipeline, run) in pipelines.iter_mut().zip(&mut runs) {
-            run.reports.push(pipeline.step(&item.frame).map_err(|error| failed(&error))?);
+            run.reports
+                .push(pipeline.step(&item.frame).map_err(|error| ReproduceError::of(log, error))?);
         }
         let known = people.get(&item.frame.index).map_or(&[][..], Vec::as_slice);
         moments.push(moment(&item.frame, known));

@@ -11,8 +11,7 @@ use tagalong_log::{FrameSource, InputSettings, Limits};
 use tagalong_pipeline::{FrameReport, Pipeline};
 use tagalong_trials::{Contender, Judge};
 
-use crate::lab::read;
-use crate::{Lab, ReproduceError};
+use crate::lab::{Lab, ReproduceError, read};
 
 /// Suffix of truth files, after the name of their log.
 const TRUTH: &str = ".people.csv";
@@ -37,16 +36,16 @@ pub(crate) fn recorded(
 ) -> Result<Vec<Vec<Recorded>>, ReproduceError> {
     let logs = logs(lab)?;
     lab.progress.begin(logs.len() * contenders.len(), "annotated logs");
-    let over_all = |contender: &Contender| {
-        logs.iter()
-            .map(|log| {
-                let recorded = log.take(lab, contender, judge);
-                lab.progress.step();
-                recorded
-            })
-            .collect()
-    };
-    contenders.iter().map(over_all).collect()
+    let mut recorded = Vec::new();
+    for contender in contenders {
+        let mut on_logs = Vec::new();
+        for log in &logs {
+            on_logs.push(log.take(lab, contender, judge)?);
+            lab.progress.step();
+        }
+        recorded.push(on_logs);
+    }
+    Ok(recorded)
 }
 
 /// A log with its annotated people by frame.
@@ -75,7 +74,7 @@ impl Log {
         let path = folder.join(format!("{name}{TRUTH}"));
         let rows = people::parse(&read(&path)?, &path.display().to_string());
         let mut people: BTreeMap<u32, Vec<Truth>> = BTreeMap::new();
-        for row in rows.map_err(|error| ReproduceError::Other(error.to_string()))? {
+        for row in rows.map_err(ReproduceError::other)? {
             let (frame, truth) = row.truth(|_| None);
             people.entry(frame).or_default().push(truth);
         }
@@ -88,12 +87,11 @@ impl Log {
         contender: &Contender,
         judge: &Judge,
     ) -> Result<Recorded, ReproduceError> {
-        let failed = |error: String| ReproduceError::Other(format!("{}: {error}", self.name));
         let mut pipeline: Pipeline = contender.pipeline(lab.registry, 1)?;
         let input = InputSettings::default();
         let limits = Limits::default();
         let mut source = FrameSource::open(&self.path, &input, &limits, pipeline.inputs())
-            .map_err(|error| failed(error.to_string()))?;
+            .map_err(|error| ReproduceError::of(&self.name, error))?;
         let mut reports = Vec::new();
         let mut frames = BTreeMap::new();
         let mut worked_ms = 0.0;
@@ -102,7 +100,9 @@ impl Log {
             let size = (camera.width, camera.height);
             // Reading the log is not part of the measured time.
             let before = ThreadTime::now();
-            let report = pipeline.step(&item.frame).map_err(|error| failed(error.to_string()))?;
+            let report = pipeline
+                .step(&item.frame)
+                .map_err(|error| ReproduceError::of(&self.name, error))?;
             worked_ms += 1e3 * before.elapsed().as_secs_f64();
             let number = u32::try_from(item.frame.index).unwrap_or(u32::MAX);
             frames.insert(
@@ -134,6 +134,6 @@ impl Log {
         let sequence = Sequence { name: self.name.clone(), frames };
         let comparison = Comparison::from(Similarity::Iou);
         Tally::measure(&sequence, &comparison, &SetDistance::default())
-            .map_err(|error| ReproduceError::Other(error.to_string()))
+            .map_err(ReproduceError::other)
     }
 }

@@ -1,6 +1,7 @@
 //! The list of published systems.
 
-use crate::{System, joint_particle, laser, omni_appearance, planners, rgbd_compressive, stereo};
+use crate::findings::System;
+use crate::{joint_particle, laser, omni_appearance, planners, rgbd_compressive, stereo};
 
 /// All systems, in the order of the papers.
 pub const SYSTEMS: &[System] = &[
@@ -34,5 +35,12 @@ mod tests {
             assert!(system(each.name).is_some() && !each.experiments.is_empty());
         }
         assert!(system("perpetuum-mobile").is_none());
+    }
+
+    #[test]
+    fn the_forms_of_each_paper_are_its_first_table() {
+        for system in SYSTEMS.iter().filter(|system| system.about.starts_with('P')) {
+            assert_eq!(system.experiments[0].name, "forms", "{}", system.name);
+        }
     }
 }

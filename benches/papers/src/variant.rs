@@ -3,17 +3,14 @@
 use tagalong_trials::Contender;
 use toml::{Table, Value};
 
-use crate::ReproduceError;
+use crate::lab::ReproduceError;
 
 /// Parses the config of a contender.
 ///
 /// # Errors
 /// A config that is not TOML.
 pub(crate) fn parsed(contender: &Contender) -> Result<Table, ReproduceError> {
-    contender
-        .config
-        .parse()
-        .map_err(|error| ReproduceError::Other(format!("{}: {error}", contender.name)))
+    contender.config.parse().map_err(|error| ReproduceError::of(&contender.name, error))
 }
 
 /// Returns the contender without a table of its config.
@@ -42,8 +39,7 @@ pub(crate) fn with_values(
         let value = text.parse().map_err(|error: toml::de::Error| fails(error.message()))?;
         *slot(&mut config, key).ok_or_else(|| fails("there is no such place"))? = value;
     }
-    let config = toml::to_string(&config)
-        .map_err(|error| ReproduceError::Other(format!("{name}: {error}")))?;
+    let config = toml::to_string(&config).map_err(|error| ReproduceError::of(name, error))?;
     Ok(Contender { name: name.to_owned(), config, ..contender.clone() })
 }
 

@@ -6,7 +6,8 @@
 use std::path::{Path, PathBuf};
 
 use tagalong_config::Registry;
-use tagalong_papers::{Lab, Progress, SimulatedScenes, Table, system};
+use tagalong_papers::{Lab, Progress, SimulatedScenes, system};
+use tagalong_report::Table;
 
 /// Published MOTA of SORT for its six validation sequences together, per cent (its README).
 const SORT_MOTA: f64 = 34.0;

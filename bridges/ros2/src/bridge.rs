@@ -228,7 +228,7 @@ impl Bridge {
 
     /// Prepares for work after a rest.
     pub(crate) fn resume(&mut self) {
-        // What came in the meantime is old.
+        // Images that came in the meantime are old.
         drop(self.inbox.take(Duration::ZERO));
         if let Some(switch) = self.switch() {
             switch.resume();

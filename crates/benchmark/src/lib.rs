@@ -192,14 +192,14 @@ mod tests {
     #[test]
     fn the_shards_of_a_plan_have_each_log_once() {
         for log in 0..7 {
-            let has = |k: &usize| {
+            let shards = (1..=3).filter(|k| {
                 let args = parse(&format!("bench run --shard {k}/3")).ok();
                 let Some(Step::Run { run, .. }) = args.and_then(|args| args.step) else {
                     return false;
                 };
                 run.shard.is_some_and(|shard| shard.has(log))
-            };
-            assert_eq!((1..=3).filter(has).collect::<Vec<_>>(), [log % 3 + 1]);
+            });
+            assert_eq!(shards.collect::<Vec<_>>(), [log % 3 + 1]);
         }
         for wrong in ["0/3", "4/3", "1/0", "3", "a/b", "1/3 --task 1"] {
             assert!(parse(&format!("bench run --shard {wrong}")).is_err(), "{wrong}");

@@ -30,20 +30,17 @@ impl DroppedPlaces {
     /// Adds those of a frame.
     pub fn take(&mut self, number: u32, report: &FrameReport, camera: &Camera) {
         let entries = report.funnel.entries();
-        let rank = |test: &str| {
-            let rank = entries.iter().position(|entry| entry.test == test);
-            u16::try_from(rank.unwrap_or(entries.len())).unwrap_or(u16::MAX)
-        };
         let candidates = report.candidates.iter().filter_map(|candidate| match candidate.fate {
             Fate::Dropped(test) => Some((test, candidate.detection.rect_in(camera))),
             _ => None,
         });
         let places = entries.iter().flat_map(|e| e.places.iter().map(move |rect| (e.test, *rect)));
         let all = candidates.chain(places).filter(|(_, rect)| rect.area() > 0.0);
-        let all = all.map(|(test, rect)| DroppedPlace {
-            test,
-            rank: rank(test),
-            box_px: [rect.x, rect.y, rect.width, rect.height].map(|v| v as f32),
+        let all = all.map(|(test, rect)| {
+            let rank = entries.iter().position(|entry| entry.test == test);
+            let rank = u16::try_from(rank.unwrap_or(entries.len())).unwrap_or(u16::MAX);
+            let box_px = [rect.x, rect.y, rect.width, rect.height].map(|v| v as f32);
+            DroppedPlace { test, rank, box_px }
         });
         self.frames.entry(number).or_default().extend(all);
     }

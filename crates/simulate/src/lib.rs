@@ -161,11 +161,10 @@ pub fn record(
     let (events, recorded) = mpsc::sync_channel(EVENTS_AHEAD);
     thread::scope(|scope| {
         // Images are encoded while the next ones are rendered.
-        let write_all = move || {
+        let writing = thread::Builder::new().spawn_scoped(scope, move || {
             recorded.into_iter().try_for_each(|event| recorder.write(&event))?;
             recorder.finish()
-        };
-        let writing = thread::Builder::new().spawn_scoped(scope, write_all);
+        });
         let writing = writing.map_err(|source| WriteError::Io { path: path.to_owned(), source })?;
         let mut images = 0;
         while let Some(event) = simulation.next_event().filter(|_| goes_on()) {
@@ -334,8 +333,8 @@ mod tests {
             assert!(differences.iter().all(|d| d.abs() < 1e-9), "{a:?} {b:?}");
             assert!((a.covariance - b.covariance).norm() < 1e-9, "{a:?} {b:?}");
             assert_eq!(logged.frame.index, drawn.index);
-            let pose = |frame: &tagalong_core::Frame| frame.camera.robot_from_camera;
-            let off = pose(&logged.frame).inverse() * pose(&drawn);
+            let logged_pose = logged.frame.camera.robot_from_camera;
+            let off = logged_pose.inverse() * drawn.camera.robot_from_camera;
             assert!(off.translation.vector.norm() < 1e-9 && off.rotation.angle() < 1e-9);
             let a = logged.frame.depth().unwrap();
             let b = drawn.depth().unwrap();

@@ -167,8 +167,8 @@ impl Draw {
         let mut newest = Vec::new();
         for (name, readings) in &self.readings {
             // On a robot a bumper that was pressed after a late image counts, too.
-            let known = |reading: &&SensorReading| is_live || reading.stamp_ns <= stamp_ns;
-            let Some(reading) = readings.iter().rev().find(known) else { continue };
+            let known = readings.iter().rev().find(|of| is_live || of.stamp_ns <= stamp_ns);
+            let Some(reading) = known else { continue };
             let then = self.known_pose(reading.stamp_ns).odom_from_robot;
             newest.push(ObstacleReading::new(
                 Arc::clone(name),

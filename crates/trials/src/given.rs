@@ -243,13 +243,13 @@ fn frames(info: &SequenceInfo, mut boxes: BTreeMap<u32, Vec<ExternalDetection>>)
     };
     let camera = Arc::new(Camera::mounted(lens, width, height, 1.2, 0.0, 0.0));
     let dt = 1.0 / info.rate_hz;
-    let frame = |index: u32| {
+    let frames = (1..=info.length).map(|index| {
         let stamp = Stamp::default().plus_seconds(f64::from(index) * dt);
         let motion = EgoMotion::at_rest(dt);
         let frame = Frame::new(index.into(), stamp, Arc::clone(&camera), motion, Images::default());
         frame.with_recorded(Some(boxes.remove(&index).unwrap_or_default()))
-    };
-    (1..=info.length).map(frame).collect()
+    });
+    frames.collect()
 }
 
 fn given(error: impl ToString) -> TrialError {

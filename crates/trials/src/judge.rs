@@ -51,8 +51,9 @@ impl Judge {
         let tally = Tally::measure(&sequence, &comparison, &SetDistance::default())?;
         let prepared = Prepared::new(&sequence, &comparison)?;
         let (_, matches) = Clear::measure(&prepared);
-        let errors = |in_start| errors_m(&moments, &sequence, &prepared, &matches, in_start);
-        Ok(Judged { tally, errors_in_robot_m: errors(false), errors_in_start_m: errors(true) })
+        let [errors_in_robot_m, errors_in_start_m] = [false, true]
+            .map(|in_start| errors_m(&moments, &sequence, &prepared, &matches, in_start));
+        Ok(Judged { tally, errors_in_robot_m, errors_in_start_m })
     }
 
     fn sequence(&self, trial: &Trial, moments: &[(&Moment, &FrameReport)]) -> Sequence {

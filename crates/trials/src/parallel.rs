@@ -54,8 +54,8 @@ pub fn in_order<S: Sync, T: Send>(
     };
     let mut all = std::thread::scope(|scope| {
         // Without another thread, those that run do its work.
-        let start = |_| std::thread::Builder::new().spawn_scoped(scope, worker).ok();
-        let others: Vec<_> = (1..threads).filter_map(start).collect();
+        let starts = (1..threads).map(|_| std::thread::Builder::new().spawn_scoped(scope, worker));
+        let others: Vec<_> = starts.filter_map(Result::ok).collect();
         let mut all = worker();
         for other in others {
             all.extend(other.join().map_err(|_| TrialError::Panicked)?);

@@ -64,7 +64,7 @@ fn moment(at: usize, people: &[&[HeadSample]], camera: &Camera) -> Moment {
 }
 
 fn report(at: usize, tracks: &[Path<'_>], camera: &Camera) -> FrameReport {
-    let track = |(id, places): &Path<'_>| {
+    let tracks = tracks.iter().filter_map(|(id, places)| {
         let (x, y) = places[at]?;
         let position = Point3::new(x, y, 1.6);
         let person = Person { position, velocity: Vector2::zeros() };
@@ -73,8 +73,8 @@ fn report(at: usize, tracks: &[Path<'_>], camera: &Camera) -> FrameReport {
             Track::new(TrackId(*id), Estimate::new(person, SMatrix::identity(), region), 1.0)
                 .with_age(9),
         )
-    };
+    });
     let mut report = FrameReport::new(at as u64 + 1, stamp(at));
-    report.tracks = tracks.iter().filter_map(track).collect();
+    report.tracks = tracks.collect();
     report
 }

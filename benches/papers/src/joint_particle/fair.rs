@@ -1,6 +1,7 @@
 //! Causes that lead the printed form of P3 away from people, step by step, in our rooms and in an empty
 //! one.
 
+use tagalong_report::{Cell, Row, Table};
 use tagalong_sim::{Scene, Split};
 use tagalong_trials::{Contender, Crossing, Failing, Run, Trial, TrialError, crossing};
 
@@ -8,8 +9,9 @@ use super::{
     KERNEL, NOISE, PRINTED, SEEN_BY, Trials, estimate, first_overlap_s, in_stereo, mean, overlaps,
     pixels_apart,
 };
+use crate::findings::Findings;
+use crate::lab::{Lab, ReproduceError};
 use crate::variant::with_values;
-use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
 const SCENE: &str = "crossing-parallel";
 /// A room that asks nothing of a method: one wall with a pattern, well lit, and nothing in front

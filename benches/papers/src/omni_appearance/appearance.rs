@@ -4,15 +4,16 @@ use std::collections::BTreeSet;
 
 use tagalong_omni_appearance::train::{Collector, Sample, Training, head, signature};
 use tagalong_omni_appearance::{Config, Distance, Head, Model, Person, recognised};
+use tagalong_report::{Cell, Row, Table};
 use tagalong_sim::Scene;
 use tagalong_trials::Draw;
 
 use super::splits::Split;
 use super::{FRESH, in_turn};
 use crate::draws::{difference, mean, means, over_draws, p_values};
-use crate::lab::read;
+use crate::findings::Findings;
+use crate::lab::{Lab, ReproduceError, read};
 use crate::printed::omni_appearance;
-use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
 /// Number of rooms, with two people each.
 const ROOMS: u64 = 8;
@@ -67,21 +68,17 @@ struct Shipped {
     head: Head,
 }
 
-fn failed(error: impl ToString) -> ReproduceError {
-    ReproduceError::Other(error.to_string())
-}
-
 impl Shipped {
     fn new(lab: &Lab, name: &str) -> Result<Self, ReproduceError> {
         let folder = lab.folder_of(name);
         let text = read(&folder.join(format!("{name}.toml")))?;
-        let config = settings(&text).map_err(failed)?;
+        let config = settings(&text).map_err(ReproduceError::other)?;
         let model = match config.model.as_str() {
             // An empty name selects the built-in model, of which this is the source.
             "" => lab.configs.join("models/omni-distance.toml"),
             model => folder.join(model),
         };
-        let model = Model::from_text(&read(&model)?).map_err(failed)?;
+        let model = Model::from_text(&read(&model)?).map_err(ReproduceError::other)?;
         Ok(Self { config, head: model.general })
     }
 }
@@ -102,7 +99,7 @@ fn settings(text: &str) -> Result<Config, toml::de::Error> {
 /// Simulates a scene and collects the samples of both detectors in it.
 fn room(lab: &Lab, scene: &Scene, shipped: &[Shipped; 2]) -> Result<Room, ReproduceError> {
     fn collector(shipped: &Shipped) -> Result<Collector, ReproduceError> {
-        Collector::new(shipped.config.clone()).map_err(failed)
+        Collector::new(shipped.config.clone()).map_err(ReproduceError::other)
     }
 
     let mut collectors = [collector(&shipped[0])?, collector(&shipped[1])?];
@@ -115,7 +112,7 @@ fn room(lab: &Lab, scene: &Scene, shipped: &[Shipped; 2]) -> Result<Room, Reprod
             .map(|truth| (u64::from(truth.id), truth.head_in_robot))
             .collect();
         for collector in &mut collectors {
-            collector.add(&simulated.frame, &people).map_err(failed)?;
+            collector.add(&simulated.frame, &people).map_err(ReproduceError::other)?;
         }
     }
     lab.progress.step();
@@ -142,7 +139,7 @@ fn fitted(samples: &[Sample], seed: u64) -> Result<Option<Head>, ReproduceError>
     if samples.len() < LEAST_SAMPLES {
         return Ok(None);
     }
-    head(samples, &Training::default(), seed).map(Some).map_err(failed)
+    head(samples, &Training::default(), seed).map(Some).map_err(ReproduceError::other)
 }
 
 fn errors(samples: &[Sample], head: &Head, how: Distance) -> Vec<f64> {
@@ -179,8 +176,8 @@ fn distances(rooms: &[Room], shipped: &[Shipped; 2]) -> Result<Table, ReproduceE
     let mut columns: Vec<Vec<Vec<Vec<f64>>>> = Vec::new();
     let mut too_few = 0;
     for split in SPLITS {
-        let within = |room| within(room, split, &mut too_few);
-        columns.push(rooms.iter().map(within).collect::<Result<_, _>>()?);
+        let errors = rooms.iter().map(|room| within(room, split, &mut too_few));
+        columns.push(errors.collect::<Result<_, _>>()?);
     }
     let heads = [&shipped[0].head, &shipped[1].head];
     columns.push(
@@ -191,11 +188,11 @@ fn distances(rooms: &[Room], shipped: &[Shipped; 2]) -> Result<Table, ReproduceE
     cells.resize(columns.len(), Cell::default());
     let mut rows = vec![Row::published("network 3-4-1", cells)];
     for (way, (name, ..)) in WAYS.iter().enumerate() {
-        let cell = |column: &Vec<Vec<Vec<f64>>>| {
+        let cells = columns.iter().map(|column| {
             let draws: Vec<Vec<f64>> = column.iter().map(|room| room[way].clone()).collect();
             over_draws(&draws, 3).within(0.0, f64::INFINITY)
-        };
-        rows.push(Row::ours(*name, columns.iter().map(cell).collect()));
+        });
+        rows.push(Row::ours(*name, cells.collect()));
     }
     let samples = rooms.iter().map(|room| room.of(Eye::Ours).len()).sum::<usize>();
     Ok(Table {

@@ -5,10 +5,12 @@ use std::collections::BTreeMap;
 use crate::triangulate::{Cameras, HatColour, Known, Sight, Station, calibrate, find_hat};
 use nalgebra::{Point2, Vector2, Vector3};
 use tagalong_geometry::{Camera, Lens};
+use tagalong_report::{Cell, Row, Table};
 use tagalong_sim::{Event, Scene, Simulation};
 
 use crate::draws::over_draws;
-use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
+use crate::findings::Findings;
+use crate::lab::{Lab, ReproduceError};
 
 /// Number of rooms, each with its own webcams.
 const ROOMS: u64 = 6;
@@ -96,10 +98,8 @@ fn of_room(lab: &Lab, scene: &Scene) -> [[Vec<f64>; 2]; 3] {
     let (truth, known) = hats(lab, &scene);
     lab.progress.step();
     // Every second position, so that both halves cover the whole walk.
-    let every =
-        |part: usize| -> Vec<Known> { known.iter().skip(part).step_by(2).cloned().collect() };
-    let used = every(0);
-    let held = every(1);
+    let [used, held]: [Vec<Known>; 2] =
+        [0, 1].map(|part| known.iter().skip(part).step_by(2).cloned().collect());
     let guess = guessed(&truth);
     let found = calibrate(&guess, &used).stations;
     [guess, found, truth].map(|stations| [&used, &held].map(|known| distances_to(&stations, known)))
@@ -110,13 +110,12 @@ pub(super) fn calibration(lab: &Lab) -> Result<Findings, ReproduceError> {
     let scenes = lab.scenes("omni-hat", &[("duration_s", SEEN_S)], lab.seeds(ROOMS))?;
     lab.progress.begin(scenes.len(), "looking at a hat");
     let rooms: Vec<_> = scenes.iter().map(|scene| of_room(lab, scene)).collect();
-    let row = |(at, name): (usize, &str)| {
-        let draws = |part: usize| -> Vec<Vec<f64>> {
-            rooms.iter().map(|room| room[at][part].clone()).collect()
-        };
-        Row::ours(name, [0, 1].map(|part| over_draws(&draws(part), 1)).to_vec())
-    };
-    let ours = ["first guess", "calibrated", "true cameras"].into_iter().enumerate().map(row);
+    let ours =
+        ["first guess", "calibrated", "true cameras"].into_iter().enumerate().map(|(at, name)| {
+            let draws =
+                [0, 1].map(|part| rooms.iter().map(|room| room[at][part].clone()).collect());
+            Row::ours(name, draws.map(|draws: Vec<_>| over_draws(&draws, 1)).to_vec())
+        });
     let published =
         Row::published("\"in the order of\"", vec![Cell::number(1.0, 0), Cell::default()]);
     let places = rooms.iter().flat_map(|room| &room[1]).map(Vec::len).sum::<usize>();

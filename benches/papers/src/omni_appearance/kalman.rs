@@ -1,11 +1,13 @@
 //! Section 6.2: the filter against the appearance model alone, and the printed method step by step.
 
+use tagalong_report::{Cell, Row, Table};
 use tagalong_sim::{Scene, Truth};
 use tagalong_trials::{Contender, Moment, Run, Trial, TrialError};
 
 use super::{FRESH, in_turn};
 use crate::draws::{difference, means, over_draws, p_values};
-use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
+use crate::findings::Findings;
+use crate::lab::{Lab, ReproduceError};
 
 /// Number of rooms, with two people each.
 const ROOMS: u64 = 10;
@@ -221,16 +223,15 @@ fn steps(walks: &[Walk]) -> Table {
         walks.iter().map(|walk| walk.of_steps[at].clone()).collect()
     };
     let row = |(at, name): (usize, &str)| {
-        let gain = |at| difference(&draws(at - 1), &draws(at), 3);
-        let found = |walk: &Walk| {
+        let found = walks.iter().map(|walk| {
             let near = walk.of_steps[at].iter().filter(|error| **error < FOUND_M).count();
             vec![100.0 * near as f64 / walk.images.max(1) as f64]
-        };
-        let found: Vec<Vec<f64>> = walks.iter().map(found).collect();
+        });
+        let found: Vec<Vec<f64>> = found.collect();
         let cells = vec![
             Cell { deviation: None, ..over_draws(&found, 1) }.within(0.0, 100.0),
             over_draws(&draws(at), 3).within(0.0, f64::INFINITY),
-            if at == 0 { Cell::default() } else { gain(at) },
+            if at == 0 { Cell::default() } else { difference(&draws(at - 1), &draws(at), 3) },
         ];
         Row::ours(name, cells)
     };

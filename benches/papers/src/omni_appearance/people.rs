@@ -1,12 +1,14 @@
 //! Beyond the paper: several people, and a robot that drives.
 
 use tagalong_eval::Tally;
+use tagalong_report::{Cell, Row, Table};
 use tagalong_sim::Scene;
 use tagalong_trials::{Judge, Trial, TrialError};
 
 use super::FRESH;
 use crate::draws::{over_draws, pooled};
-use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
+use crate::findings::Findings;
+use crate::lab::{Lab, ReproduceError};
 
 /// The printed method, the corrected one, its detector with the filter of P1, and the best.
 const PIPELINES: [&str; 4] =
@@ -63,7 +65,8 @@ fn judged(trial: Trial) -> Result<Vec<PipelineResult>, TrialError> {
 }
 
 fn table(title: &str, trials: &[Vec<PipelineResult>]) -> Table {
-    let row = |(at, name): (usize, &&str)| {
+    let columns = ["IDF1, %", "MOTA, %", "renamed", "position error, m"];
+    let rows = PIPELINES.iter().enumerate().map(|(at, name)| {
         let tallies: Vec<&Tally> = trials.iter().map(|done| &done[at].tally).collect();
         let share = |of, least| pooled(&tallies, 3, of).within(least, 1.0).percent();
         let swaps = Cell::number(Tally::combine(tallies.iter().copied()).scores().idsw as f64, 0);
@@ -75,12 +78,11 @@ fn table(title: &str, trials: &[Vec<PipelineResult>]) -> Table {
             over_draws(&errors, 3).within(0.0, f64::INFINITY),
         ];
         Row::ours(*name, cells)
-    };
-    let columns = ["IDF1, %", "MOTA, %", "renamed", "position error, m"];
+    });
     Table {
         title: format!("{title}: who is where (not in P5)"),
         columns: columns.map(String::from).to_vec(),
-        rows: PIPELINES.iter().enumerate().map(row).collect(),
+        rows: rows.collect(),
         notes: vec![format!(
             "{} draws; a report is right within half a metre; people beyond 6 m do not count. {FRESH} \
              The printed method is one for one person.",

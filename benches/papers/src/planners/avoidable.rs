@@ -3,11 +3,13 @@
 //! A ride with such seconds is driven again, with a robot that stands from some time before them on. What
 //! a robot that stands has as well is the doing of the others.
 
+use tagalong_report::{Cell, Row, Table};
 use tagalong_sim::{FaultKind, InjectedFault};
 use tagalong_trials::{Ride, Tick, TrialError, in_order};
 
 use super::rides::{Job, PLANNERS, SETTINGS, Source, jobs};
-use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
+use crate::findings::Findings;
+use crate::lab::{Lab, ReproduceError};
 
 /// Gap to another person below which the robot is in the private zone, m.
 const PRIVATE_M: f64 = 0.45;
@@ -118,12 +120,7 @@ fn of_job(lab: &Lab, job: &Job) -> Result<Counts, TrialError> {
 }
 
 /// Drives a ride again until `to_s` with wheels that stand from `from_s` on.
-fn stopped(
-    lab: &Lab,
-    job: &Job,
-    from_s: f64,
-    to_s: f64,
-) -> Result<Ride, TrialError> {
+fn stopped(lab: &Lab, job: &Job, from_s: f64, to_s: f64) -> Result<Ride, TrialError> {
     let mut scene = job.scene.clone();
     let fault = InjectedFault {
         kind: Some(FaultKind::WheelsStuck),

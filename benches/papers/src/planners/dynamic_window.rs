@@ -9,15 +9,12 @@ use std::f64::consts::PI;
 use nalgebra::{Point2, Vector2};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_config::{Registry, check_settings};
-use tagalong_controllers::step_s;
-use tagalong_core::{Controller, Input, Inputs, Result, Scene, Twist};
+use tagalong_config::Registry;
+use tagalong_core::Twist;
 
 use super::obstacles::{PERSON_M, others, readings};
-use super::quarry::Quarry;
+use super::planner::{Planner, Situation, Steering};
 
-/// Above this no length or speed on the floor makes sense, whatever the unit.
-const MOST: f64 = 1e6;
 /// Time step of the drives in thought, s, and their number.
 const STEP_S: f64 = 0.1;
 const STEPS: usize = 20;
@@ -70,13 +67,6 @@ impl Default for Config {
     }
 }
 
-/// The planner.
-pub struct DynamicWindow {
-    config: Config,
-    quarry: Option<Quarry>,
-    last: Twist,
-}
-
 /// A drive in thought: its speeds, and the positions and headings after each step.
 struct Drive {
     twist: Twist,
@@ -127,54 +117,46 @@ impl Drive {
     }
 }
 
-impl DynamicWindow {
-    /// Creates a planner of a robot at rest.
-    ///
-    /// # Errors
-    /// Settings outside their ranges.
-    pub fn new(config: Config) -> Result<Self> {
-        check_settings(&config)?;
-        Ok(Self { config, quarry: None, last: Twist::STOP })
-    }
-
+impl Config {
     /// Returns the speeds that the accelerations allow within a step, m/s and rad/s.
-    fn window(&self, max_mps: f64, max_rps: f64, dt_s: f64) -> Vec<Twist> {
+    fn window(&self, now: &Situation<'_>, max_rps: f64) -> Vec<Twist> {
         let [linear, angular] = [
-            (self.last.linear_mps, self.config.max_acceleration * dt_s, max_mps),
-            (self.last.angular_rps, self.config.max_angular_acceleration * dt_s, max_rps),
+            (now.last.linear_mps, self.max_acceleration * now.dt_s, now.max_mps),
+            (now.last.angular_rps, self.max_angular_acceleration * now.dt_s, max_rps),
         ]
         .map(|(last, change, most)| speeds(last - change, last + change, most));
         linear.iter().flat_map(|v| angular.iter().map(|w| Twist::new(*v, *w))).collect()
     }
+}
 
-    fn steer(&self, scene: &Scene<'_>, quarry: &Quarry, dt_s: f64) -> Option<Twist> {
-        let max_mps = scene.max_speed_mps;
-        let half_m = scene.wheels.half_separation_m;
-        if ![max_mps, half_m].iter().all(|value| *value > 0.0 && *value <= MOST) {
-            return None;
-        }
-        let max_rps = self.config.max_turn_rate.min(max_mps / half_m);
-        let distance_m = self.config.distance_m + PERSON_M;
+impl Steering for Config {
+    fn steer(&self, now: &Situation<'_>) -> Twist {
+        let max_rps = self.max_turn_rate.min(now.max_rps);
         let horizon_s = STEP_S * STEPS as f64;
-        let [first, last] = [0.0, horizon_s].map(|s| quarry.goal(s, horizon_s, distance_m));
-        let mut obstacles = readings(scene, &quarry.place);
-        obstacles.extend(others(scene));
-        let collision_m = self.config.radius_m + PERSON_M;
-        let drives: Vec<Drive> =
-            self.window(max_mps, max_rps, dt_s).into_iter().map(Drive::new).collect();
+        let stand_off_m = self.stand_off_m();
+        let [first, last] = [0.0, horizon_s].map(|s| now.quarry.goal(s, horizon_s, stand_off_m));
+        let mut obstacles = readings(now.scene, &now.quarry.place);
+        obstacles.extend(others(now.scene));
+        let collision_m = self.radius_m + PERSON_M;
+        let drives: Vec<Drive> = self.window(now, max_rps).into_iter().map(Drive::new).collect();
         let costs = [
             scaled(drives.iter().map(|drive| drive.heading_cost(&first, &last))),
             scaled(drives.iter().map(|drive| nalgebra::distance(&drive.poses[0].0, &first))),
             scaled(drives.iter().map(|drive| drive.obstacle_cost(&obstacles, collision_m))),
-            scaled(drives.iter().map(|drive| max_mps - drive.twist.linear_mps)),
+            scaled(drives.iter().map(|drive| now.max_mps - drive.twist.linear_mps)),
         ];
-        let total = |drive: usize| -> f64 {
-            costs.iter().zip(WEIGHTS).map(|(cost, weight)| weight * cost[drive]).sum()
-        };
-        let best = (0..drives.len()).min_by(|a, b| total(*a).total_cmp(&total(*b)))?;
-        let twist = drives[best].twist;
-        let is_stuck = [twist, self.last].iter().all(|twist| twist.linear_mps.abs() < STUCK_MPS);
-        Some(if is_stuck { Twist::new(twist.linear_mps, -max_rps) } else { twist })
+        let totals = drives.iter().enumerate().map(|(at, drive)| {
+            let costs = costs.iter().zip(WEIGHTS).map(|(cost, weight)| weight * cost[at]);
+            (drive.twist, costs.sum::<f64>())
+        });
+        let best = totals.min_by(|(_, a), (_, b)| a.total_cmp(b));
+        let Some((twist, _)) = best else { return Twist::STOP };
+        let is_stuck = [twist, now.last].iter().all(|twist| twist.linear_mps.abs() < STUCK_MPS);
+        if is_stuck { Twist::new(twist.linear_mps, -max_rps) } else { twist }
+    }
+
+    fn stand_off_m(&self) -> f64 {
+        self.distance_m + PERSON_M
     }
 }
 
@@ -197,30 +179,12 @@ fn scaled(costs: impl Iterator<Item = f64>) -> Vec<f64> {
     costs
 }
 
-impl Controller for DynamicWindow {
-    fn inputs(&self) -> Inputs {
-        Inputs::NONE.accept(Input::Laser)
-    }
-
-    fn command(&mut self, scene: &Scene<'_>) -> Twist {
-        let dt_s = step_s(&scene.frame.motion);
-        self.quarry = Quarry::next(self.quarry, scene);
-        let twist = self.quarry.and_then(|quarry| self.steer(scene, &quarry, dt_s));
-        self.last = twist.unwrap_or(Twist::STOP);
-        self.last
-    }
-
-    fn stand_off_m(&self) -> Option<f64> {
-        Some(self.config.distance_m + PERSON_M)
-    }
-}
-
 /// Registers the planner.
 pub(super) fn register(registry: &mut Registry) {
     registry.controller(
         "follow-bench-dwa",
         "follows by the improved dynamic window approach of Follow-Bench",
-        |config: Config, _| DynamicWindow::new(config),
+        |config: Config, _| Planner::new(config),
     );
 }
 

@@ -8,14 +8,14 @@
 mod avoidable;
 mod dynamic_window;
 mod obstacles;
-mod quarry;
+mod planner;
 mod rides;
 mod social_force;
 mod table;
 
 use tagalong_config::Registry;
 
-use crate::{Experiment, System};
+use crate::findings::{Experiment, System};
 
 /// The benchmark: our controllers beside its planners, on the same seeds.
 pub const SYSTEM: System = System {

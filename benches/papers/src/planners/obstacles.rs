@@ -33,8 +33,9 @@ pub(super) fn centres(readings: &[Point2<f64>]) -> Vec<Point2<f64>> {
 /// Returns the clusters by DBSCAN; readings with too few neighbours belong to none.
 fn clusters(readings: &[Point2<f64>]) -> Vec<Vec<Point2<f64>>> {
     let near = |a: usize| -> Vec<usize> {
-        let is_near = |b: &usize| nalgebra::distance(&readings[a], &readings[*b]) <= NEIGHBOUR_M;
-        (0..readings.len()).filter(is_near).collect()
+        (0..readings.len())
+            .filter(|b| nalgebra::distance(&readings[a], &readings[*b]) <= NEIGHBOUR_M)
+            .collect()
     };
     let mut is_taken = vec![false; readings.len()];
     let mut clusters = Vec::new();
@@ -76,8 +77,8 @@ fn rectangle_centre(points: &[Point2<f64>]) -> Point2<f64> {
         let [along_m, across_m] = [along, across].map(|axis| span(&hull, &axis));
         let area = (along_m[1] - along_m[0]) * (across_m[1] - across_m[0]);
         if area < best.0 {
-            let middle = |ends: [f64; 2]| 0.5 * (ends[0] + ends[1]);
-            best = (area, Point2::from(along * middle(along_m) + across * middle(across_m)));
+            let [along_m, across_m] = [along_m, across_m].map(|ends| 0.5 * (ends[0] + ends[1]));
+            best = (area, Point2::from(along * along_m + across * across_m));
         }
     }
     best.1

@@ -4,7 +4,7 @@ use tagalong_sim::Scene;
 use tagalong_trials::{Contender, CrowdMeasures, Ride, Tick, TrialError, Witness, in_order};
 use toml::Table as Toml;
 
-use crate::{Lab, ReproduceError};
+use crate::lab::{Lab, ReproduceError};
 
 /// Settings of the benchmark.
 pub(super) const SETTINGS: [&str; 5] = ["circular", "corridor", "crossing", "doorway", "clutter"];

@@ -6,15 +6,12 @@
 use nalgebra::{Point2, Vector2};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_config::{Registry, check_settings};
-use tagalong_controllers::step_s;
-use tagalong_core::{Controller, Input, Inputs, Result, Scene, Twist};
+use tagalong_config::Registry;
+use tagalong_core::Twist;
 
 use super::obstacles::{centres, others, readings};
-use super::quarry::Quarry;
+use super::planner::{Planner, Situation, Steering};
 
-/// Above this no length or speed on the floor makes sense, whatever the unit.
-const MOST: f64 = 1e6;
 /// Time ahead at which a lost person is expected, s.
 const HORIZON_S: f64 = 2.0;
 /// Largest wanted speed, m/s, and gain of the way towards it, 1/s.
@@ -51,42 +48,23 @@ impl Default for Config {
     }
 }
 
-/// The planner.
-pub struct SocialForce {
-    config: Config,
-    quarry: Option<Quarry>,
-    /// Velocity of the last command along the heading, m/s.
-    speed_mps: f64,
-}
-
-impl SocialForce {
-    /// Creates a planner of a robot at rest.
-    ///
-    /// # Errors
-    /// Settings outside their ranges.
-    pub fn new(config: Config) -> Result<Self> {
-        check_settings(&config)?;
-        Ok(Self { config, quarry: None, speed_mps: 0.0 })
+impl Steering for Config {
+    fn steer(&self, now: &Situation<'_>) -> Twist {
+        let goal = now.quarry.goal(0.0, HORIZON_S, self.distance_m);
+        let things = centres(&readings(now.scene, &now.quarry.place));
+        let velocity = Vector2::new(now.last.linear_mps, 0.0);
+        let pull = attraction(&goal, 2.0 * self.radius_m);
+        let push = of_people(&others(now.scene)) + of_things(&things);
+        let wanted = velocity + ((pull - velocity) * GAIN + push) * now.dt_s;
+        let twist = towards(&wanted.cap_magnitude(SPEED_MPS));
+        Twist::new(
+            twist.linear_mps.min(now.max_mps),
+            twist.angular_rps.clamp(-now.max_rps, now.max_rps),
+        )
     }
 
-    fn steer(&self, scene: &Scene<'_>, quarry: &Quarry, dt_s: f64) -> Option<Twist> {
-        let max_mps = scene.max_speed_mps;
-        let half_m = scene.wheels.half_separation_m;
-        if ![max_mps, half_m].iter().all(|value| *value > 0.0 && *value <= MOST) {
-            return None;
-        }
-        let goal = quarry.goal(0.0, HORIZON_S, self.config.distance_m);
-        let things = centres(&readings(scene, &quarry.place));
-        let velocity = Vector2::new(self.speed_mps, 0.0);
-        let pull = attraction(&goal, 2.0 * self.config.radius_m);
-        let push = of_people(&others(scene)) + of_things(&things);
-        let wanted = velocity + ((pull - velocity) * GAIN + push) * dt_s;
-        let twist = towards(&wanted.cap_magnitude(SPEED_MPS));
-        let turn_limit = max_mps / half_m;
-        Some(Twist::new(
-            twist.linear_mps.min(max_mps),
-            twist.angular_rps.clamp(-turn_limit, turn_limit),
-        ))
+    fn stand_off_m(&self) -> f64 {
+        self.distance_m
     }
 }
 
@@ -135,31 +113,12 @@ fn towards(velocity: &Vector2<f64>) -> Twist {
     Twist::new((speed_mps * angle_rad.cos()).max(0.0), turn)
 }
 
-impl Controller for SocialForce {
-    fn inputs(&self) -> Inputs {
-        Inputs::NONE.accept(Input::Laser)
-    }
-
-    fn command(&mut self, scene: &Scene<'_>) -> Twist {
-        let dt_s = step_s(&scene.frame.motion);
-        self.quarry = Quarry::next(self.quarry, scene);
-        let twist = self.quarry.and_then(|quarry| self.steer(scene, &quarry, dt_s));
-        let twist = twist.unwrap_or(Twist::STOP);
-        self.speed_mps = twist.linear_mps;
-        twist
-    }
-
-    fn stand_off_m(&self) -> Option<f64> {
-        Some(self.config.distance_m)
-    }
-}
-
 /// Registers the planner.
 pub(super) fn register(registry: &mut Registry) {
     registry.controller(
         "follow-bench-sfm",
         "follows by the social force model of Follow-Bench",
-        |config: Config, _| SocialForce::new(config),
+        |config: Config, _| Planner::new(config),
     );
 }
 

@@ -1,9 +1,11 @@
 //! Measures of Follow-Bench in a table.
 
 use tagalong_eval::{mean_interval, percentile};
+use tagalong_report::{Cell, Row, Table};
 
 use super::rides::{Driven, PLANNERS, SETTINGS, Source, drive, jobs};
-use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
+use crate::findings::Findings;
+use crate::lab::{Lab, ReproduceError};
 
 /// Speed of a target that a robot of 0.9 m/s can follow, m/s.
 const WALK_MPS: f64 = 0.8;
@@ -106,9 +108,7 @@ fn cells(rides: &[&Driven]) -> Vec<Cell> {
         }
     };
     let took: Vec<f64> = rides.iter().flat_map(|ride| &ride.took_ms).copied().collect();
-    let took = |part| {
-        percentile(&took, part).map_or_else(Cell::default, |ms| Cell::number(ms, 2))
-    };
+    let took = |part| percentile(&took, part).map_or_else(Cell::default, |ms| Cell::number(ms, 2));
     vec![
         Cell::number(count as f64, 0),
         share(|ride| ride.measures.success),

@@ -81,7 +81,7 @@ fn window(template: &Template) -> f64 {
 mod tests {
     use proptest::prelude::*;
     use tagalong_core::DepthImage;
-    use tagalong_depth_template::{Bank, Direction, Pose, TemplateRow};
+    use tagalong_depth_template::{Bank, Direction, Pose};
 
     use super::*;
 
@@ -133,8 +133,9 @@ mod tests {
         let depth = DepthImage::from_fn(220, 220, |x, y| {
             let row = shape.rows.iter().find(|r| r.dy == y as i64 - 100);
             let dx = x as i64 - 110;
-            let outline = |r: &TemplateRow| (r.from + r.guard_from) / 2..(r.to + r.guard_to) / 2;
-            let is_person = row.is_some_and(|r| outline(r).contains(&dx));
+            let is_person = row.is_some_and(|row| {
+                ((row.from + row.guard_from) / 2..(row.to + row.guard_to) / 2).contains(&dx)
+            });
             if is_person { z as f32 } else { z as f32 + 2.0 }
         });
         let rows = RowSums::new(&depth, 1);

@@ -174,8 +174,8 @@ mod tests {
     fn without_an_offset_the_first_particle_is_preferred() {
         let weights = [0.1, 0.1, 0.4, 0.4];
         let first = |steps: &PrintedSteps| {
-            let kept = |seed| steps.resample(&weights, 4, &mut Random::new(seed, 0));
-            (0..200).filter(|seed| kept(*seed)[0] == 0).count()
+            let draws = (0..200).map(|seed| steps.resample(&weights, 4, &mut Random::new(seed, 0)));
+            draws.filter(|kept| kept[0] == 0).count()
         };
         assert_eq!(without_offset(&weights), [0, 2, 2, 3]);
         assert_eq!(first(&PRINTED), 200);

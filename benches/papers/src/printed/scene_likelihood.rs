@@ -89,9 +89,8 @@ impl Metres {
         if !(0..self.height).contains(&line) {
             return Sums::default();
         }
-        let at = |x: i64| self.sums[(line * (self.width + 1) + x.clamp(0, self.width)) as usize];
-        let a = at(from);
-        let b = at(to.max(from));
+        let [a, b] = [from, to.max(from)]
+            .map(|x| self.sums[(line * (self.width + 1) + x.clamp(0, self.width)) as usize]);
         Sums { count: b.count - a.count, sum: b.sum - a.sum, squares: b.squares - a.squares }
     }
 }

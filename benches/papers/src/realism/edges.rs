@@ -3,7 +3,6 @@
 
 use tagalong_core::DepthImage;
 use tagalong_geometry::Rect;
-use tagalong_sim::Truth;
 use tagalong_trials::{SimulatedFrame, TrialError};
 
 use super::{Check, depth, deviation, scene, simulated};
@@ -54,15 +53,12 @@ pub fn checks(rig: &Rig, seeds: u64) -> Result<Vec<Check>, TrialError> {
         simulated(&scene(&standing))
             .for_each(|simulated| offsets.extend(displacements(&simulated)));
     }
-    let share = |wanted: i64| {
-        100.0
-            * offsets.iter().filter(|o| (o.round() as i64).clamp(-BINS, BINS) == wanted).count()
-                as f64
-            / offsets.len().max(1) as f64
-    };
-    let mut checks: Vec<Check> = (-BINS..=BINS)
-        .map(|bin| Check::told(group, format!("edges displaced by {}", name(bin)), share(bin), "%"))
-        .collect();
+    let mut checks = Vec::new();
+    for bin in -BINS..=BINS {
+        let there = offsets.iter().filter(|o| (o.round() as i64).clamp(-BINS, BINS) == bin).count();
+        let percent = 100.0 * there as f64 / offsets.len().max(1) as f64;
+        checks.push(Check::told(group, format!("edges displaced by {}", name(bin)), percent, "%"));
+    }
     let centre = mean(&offsets);
     checks.push(Check::between(group, "mean, outwards positive", centre, "px", mean_px));
     let spread = deviation(&offsets);
@@ -81,7 +77,7 @@ fn name(bin: i64) -> String {
 /// Returns the displacements of the left, right and upper edge of every wholly visible person.
 fn displacements(simulated: &SimulatedFrame) -> Vec<f64> {
     let Some(depth) = depth(&simulated.frame) else { return Vec::new() };
-    let of = |person: &Truth| {
+    let displacements = simulated.truth.iter().filter_map(|person| {
         let whole = person.upper_body?;
         let seen = person.visible?;
         let trunk = simulated.frame.camera.depth_of(&person.torso_in_robot) as f32;
@@ -93,8 +89,8 @@ fn displacements(simulated: &SimulatedFrame) -> Vec<f64> {
             (seen.y > whole.y + 1.0).then_some(seen.y - measured.y),
         ];
         (person.visible_fraction > 0.95).then_some(free)
-    };
-    simulated.truth.iter().filter_map(of).flatten().flatten().collect()
+    });
+    displacements.flatten().flatten().collect()
 }
 
 /// Returns the bounds of the pixels that are as far away as the trunk.
@@ -103,9 +99,10 @@ fn extent(depth: &DepthImage, seen: &Rect, trunk_m: f32) -> Option<Rect> {
     let right = seen.right() as i64 + REACH_PX;
     let top = seen.y as i64 - REACH_PX;
     let bottom = seen.bottom() as i64;
-    let near = |x: i64, y: i64| depth.get(x, y).is_some_and(|z| (z - trunk_m).abs() < BODY_M);
     let body = (top..bottom).flat_map(|y| (left..right).map(move |x| (x, y)));
-    let body: Vec<(i64, i64)> = body.filter(|(x, y)| near(*x, *y)).collect();
+    let body: Vec<(i64, i64)> = body
+        .filter(|(x, y)| depth.get(*x, *y).is_some_and(|z| (z - trunk_m).abs() < BODY_M))
+        .collect();
     let xs = || body.iter().map(|(x, _)| *x);
     let x = xs().min()? as f64;
     let y = body.iter().map(|(_, y)| *y).min()? as f64;

@@ -48,6 +48,13 @@ fn is_believed(candidate: &Candidate) -> bool {
 
 /// Returns the share of single coat stands, three metres ahead, with an accepted detection.
 fn coat_stands(registry: &Registry, seeds: u64) -> Result<f64, TrialError> {
+    fn taken(trial: Trial) -> Result<f64, TrialError> {
+        let all = trial.runs[0].reports.iter().flat_map(|r| &r.candidates);
+        let stand_at = Point2::new(3.0, 0.0);
+        let mut near = all.filter(|c| (c.detection.position.xy() - stand_at).norm() < 0.6);
+        Ok(f64::from(u8::from(near.any(is_believed))))
+    }
+
     // Eight seeds cover all headings, 45 degrees apart.
     let scenes: Vec<Scene> = (1..=seeds.max(8))
         .map(|seed| {
@@ -58,12 +65,6 @@ fn coat_stands(registry: &Registry, seeds: u64) -> Result<f64, TrialError> {
             ))
         })
         .collect();
-    let stand_at = Point2::new(3.0, 0.0);
-    let taken = |trial: Trial| {
-        let all = trial.runs[0].reports.iter().flat_map(|r| &r.candidates);
-        let near = |c: &&Candidate| nalgebra::distance(&c.detection.position.xy(), &stand_at) < 0.6;
-        Ok(f64::from(u8::from(all.filter(near).any(is_believed))))
-    };
     Ok(mean(&each(&scenes, &[ekf()], registry, threads(None), taken, |_| ())?))
 }
 

@@ -79,9 +79,8 @@ fn heads(speed_mps: f64) -> Vec<Point3<f64>> {
 /// last crossing.
 fn crossings_per_s(values: &[f64]) -> f64 {
     let centre = mean(values);
-    let rises = |pair: &[f64]| pair[0] < centre && pair[1] >= centre;
     let at: Vec<f64> = (0..values.len().saturating_sub(1))
-        .filter(|i| rises(&values[*i..*i + 2]))
+        .filter(|i| values[*i] < centre && values[*i + 1] >= centre)
         // Interpolated, because a step is only some 25 samples long.
         .map(|i| i as f64 + (centre - values[i]) / (values[i + 1] - values[i]))
         .collect();

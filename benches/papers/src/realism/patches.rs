@@ -168,8 +168,7 @@ fn roughness(pixels: &[f32], trunk_m: f32) -> f64 {
 /// sample is held out.
 fn cross_validated(a: &[Vec<Sample>], b: &[Vec<Sample>]) -> f64 {
     fn halves(all: &[Vec<Sample>]) -> Vec<Vec<Sample>> {
-        let half = |odd: usize| all[0].iter().skip(odd).step_by(2).cloned().collect();
-        vec![half(0), half(1)]
+        [0, 1].map(|odd| all[0].iter().skip(odd).step_by(2).cloned().collect()).to_vec()
     }
 
     fn others(all: &[Vec<Sample>], fold: usize) -> Vec<Sample> {

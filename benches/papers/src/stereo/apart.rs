@@ -2,10 +2,12 @@
 
 use nalgebra::Point3;
 use tagalong_pipeline::{Candidate, Fate};
+use tagalong_report::{Cell, Row, Table};
 use tagalong_trials::{Moment, Run, Trial, TrialError};
 
 use super::{PIPELINES, STEREO};
-use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
+use crate::findings::Findings;
+use crate::lab::{Lab, ReproduceError};
 
 /// Scene with two people before a robot at rest.
 const SCENE: &str = "crossing-parallel";

@@ -1,12 +1,14 @@
 //! Verifier of P4 with as many samples as the paper had, and with all that there are.
 
 use tagalong_config::{Example, Trainer};
+use tagalong_report::{Cell, Row, Table};
 use tagalong_sim::Split;
 
-use super::left_out::{DETECTS, LOWERED, judges_of, other, trainer, visit, without_verifiers};
+use super::left_out::{DETECTS, LOWERED, judges_of, trainer, visit, without_verifiers};
 use super::variants;
 use super::verifier::share;
-use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
+use crate::findings::Findings;
+use crate::lab::{Lab, ReproduceError};
 
 const PLUGIN: &str = "svm-patch";
 /// Forms of the patches, with the settings of their training but the number of samples. The penalties
@@ -50,7 +52,7 @@ pub fn few_samples(lab: &Lab) -> Result<Findings, ReproduceError> {
         counts[usize::from(candidate.is_person)] += 1;
         let example = Example { is_person: candidate.is_person, group: candidate.group };
         for trainer in trainers.iter_mut().flatten() {
-            trainer.add(frame, candidate.detection, example).map_err(other)?;
+            trainer.add(frame, candidate.detection, example).map_err(ReproduceError::other)?;
         }
         Ok(())
     })?;
@@ -67,7 +69,8 @@ pub fn few_samples(lab: &Lab) -> Result<Findings, ReproduceError> {
         }
         for (judges, judged) in judges.iter_mut().zip(&mut judged) {
             for judge in judges {
-                let margin = judge.log_odds(frame, candidate.detection).map_err(other)?;
+                let margin =
+                    judge.log_odds(frame, candidate.detection).map_err(ReproduceError::other)?;
                 judged.add(candidate.is_person, candidate.detection.score + margin < 0.0);
             }
         }

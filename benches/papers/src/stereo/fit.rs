@@ -5,6 +5,7 @@ use tagalong_core::{Frame, Funnel};
 use tagalong_eval::Tally;
 use tagalong_geometry::Camera;
 use tagalong_pipeline::Pipeline;
+use tagalong_report::{Cell, Row, Table};
 use tagalong_sim::{Scene, Split};
 use tagalong_stereo::{StereoDepth, StereoSettings};
 use tagalong_trials::{Contender, Draw, Judge, Moment, Run, Trial, TrialError, in_order};
@@ -12,7 +13,8 @@ use tagalong_trials::{Contender, Draw, Judge, Moment, Run, Trial, TrialError, in
 use super::STEREO;
 use super::variants::{self, Variant};
 use super::walk::{FOLLOWED, only_the_walker_counts};
-use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
+use crate::findings::Findings;
+use crate::lab::{Lab, ReproduceError};
 
 /// Error of a frame without an estimate, m: the judge matches no estimate that is farther away.
 const WITHOUT_M: f64 = 0.5;

@@ -1,10 +1,12 @@
 //! Comparison of the printed pipeline, the corrected one and ours on the same scenes.
 
 use tagalong_eval::{mean_interval, paired_gain};
+use tagalong_report::{Cell, Row, Table};
 use tagalong_trials::{Judge, Judged, Trial, TrialError};
 
 use super::{PIPELINES, STEREO};
-use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
+use crate::findings::Findings;
+use crate::lab::{Lab, ReproduceError};
 
 /// Suites of P1 and P4, a crowd, and crossings.
 const SUITES: [&str; 5] =
@@ -92,14 +94,13 @@ fn cells(draws: &[Vec<Judged>], score: Score) -> Vec<Cell> {
     // A draw without a score of one pipeline cannot be paired.
     let known: Vec<&Vec<f64>> =
         scores.iter().filter(|draw| draw.iter().all(|v| v.is_finite())).collect();
-    let of = |at: usize| known.iter().map(|draw| draw[at]).collect::<Vec<f64>>();
-    let all = [of(0), of(1), of(2)];
-    let mean = |at: usize| Cell::estimate(mean_interval(&all[at]), digits).within(least, most);
-    let step = |from: usize| {
-        let gain = paired_gain(&all[from], &all[from + 1]);
+    let all = [0, 1, 2].map(|at| known.iter().map(|draw| draw[at]).collect::<Vec<f64>>());
+    let means = all.iter().map(|of| Cell::estimate(mean_interval(of), digits).within(least, most));
+    let steps = all.windows(2).map(|pair| {
+        let gain = paired_gain(&pair[0], &pair[1]);
         Cell::estimate(gain.map(|gain| gain.difference), digits)
-    };
-    vec![mean(0), mean(1), mean(2), step(0), step(1)]
+    });
+    means.chain(steps).collect()
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ use std::fs;
 use tagalong_config::{ConfigError, Context, Example, Trainer, Value};
 use tagalong_core::{Detection, DiffDrive, Frame, Funnel, Verifier};
 use tagalong_pipeline::{Fate, Pipeline};
+use tagalong_report::{Cell, Row, Table as Page};
 use tagalong_sim::{Furniture, FurnitureKind, Scene, Split, Truth};
 use tagalong_stereo::StereoDepth;
 use tagalong_trials::{Contender, Draw};
@@ -15,7 +16,8 @@ use toml::de::{DeTable, DeValue};
 
 use super::verifier::{Whose, share, what_stands_at, whose};
 use super::{STEREO, variants};
-use crate::{Cell, Findings, Lab, ReproduceError, Row, Table as Page};
+use crate::findings::Findings;
+use crate::lab::{Lab, ReproduceError};
 
 /// Kinds that are left out in turn.
 const KINDS: [FurnitureKind; 6] = [
@@ -94,7 +96,7 @@ pub fn left_out(lab: &Lab) -> Result<Findings, ReproduceError> {
                 continue;
             }
             let example = Example { is_person: sighting.is_person, group: sighting.group };
-            trainer.1.add(frame, sighting.detection, example).map_err(other)?;
+            trainer.1.add(frame, sighting.detection, example).map_err(ReproduceError::other)?;
         }
         Ok(())
     })?;
@@ -113,7 +115,9 @@ pub fn left_out(lab: &Lab) -> Result<Findings, ReproduceError> {
         for (judges, (things, people)) in judges.iter_mut().zip(things.iter_mut().zip(&mut people))
         {
             let mut rejects = |at: usize| -> Result<u64, ReproduceError> {
-                let margin = judges[at].log_odds(frame, sighting.detection).map_err(other)?;
+                let margin = judges[at]
+                    .log_odds(frame, sighting.detection)
+                    .map_err(ReproduceError::other)?;
                 Ok(u64::from(sighting.detection.score + margin < 0.0))
             };
             let all = rejects(KINDS.len())?;
@@ -143,16 +147,16 @@ fn table(
         std::iter::once(Cell::number(of[0].with[0] as f64, 0)).chain(each).collect()
     }
 
-    let of_kind = |at: usize| std::array::from_fn(|verifier| things[verifier][at]);
-    let sum = |of: [Judged; KINDS.len()]| {
+    fn sum(of: [Judged; KINDS.len()]) -> Judged {
         of.iter().fold(Judged::default(), |sum, one| Judged {
             with: [sum.with[0] + one.with[0], sum.with[1] + one.with[1]],
             without: [sum.without[0] + one.without[0], sum.without[1] + one.without[1]],
         })
-    };
-    let mut rows = vec![Row::ours("all kinds", cells(std::array::from_fn(|v| sum(things[v]))))];
+    }
+
+    let mut rows = vec![Row::ours("all kinds", cells(things.map(sum)))];
     let kinds = KINDS.iter().enumerate();
-    rows.extend(kinds.map(|(at, kind)| Row::ours(kind.name(), cells(of_kind(at)))));
+    rows.extend(kinds.map(|(at, kind)| Row::ours(kind.name(), cells(things.map(|of| of[at])))));
     // Each model is tested on each person, so that the sums count people once per kind.
     let times = KINDS.len() as u64;
     let mut of_people: Vec<Cell> = cells(*people);
@@ -224,13 +228,16 @@ fn in_scene(
     see: See<'_>,
 ) -> Result<(), ReproduceError> {
     let mut pipeline: Pipeline = detects.pipeline(lab.registry, 1)?;
-    let mut stereo = StereoDepth::new(variants::stereo_settings(detects)?).map_err(other)?;
+    let mut stereo =
+        StereoDepth::new(variants::stereo_settings(detects)?).map_err(ReproduceError::other)?;
     let mut draw = Draw::new(scene, lab.jobs);
     let furniture: Vec<Furniture> = draw.simulation().furniture().to_vec();
     while let Some(simulated) = draw.next_frame() {
-        let depth = stereo.depth(&simulated.frame, &mut Funnel::default()).map_err(other)?;
+        let depth = stereo
+            .depth(&simulated.frame, &mut Funnel::default())
+            .map_err(ReproduceError::other)?;
         let frame = simulated.frame.with_depth(depth);
-        let report = pipeline.step(&frame).map_err(other)?;
+        let report = pipeline.step(&frame).map_err(ReproduceError::other)?;
         for candidate in &report.candidates {
             let detection = &candidate.detection;
             let Some(is_person) = is_person(detection, &simulated.truth) else { continue };
@@ -279,13 +286,13 @@ pub(super) fn judges_of(
     settings: &str,
     trainers: Vec<Box<dyn Trainer>>,
 ) -> Result<Vec<Box<dyn Verifier>>, ReproduceError> {
-    let folder = tempfile::tempdir().map_err(other)?;
+    let folder = tempfile::tempdir().map_err(ReproduceError::other)?;
     let mut judges = Vec::new();
     for (at, mut trainer) in trainers.into_iter().enumerate() {
-        let fitted = trainer.fit(&mut |_| ()).map_err(other)?;
+        let fitted = trainer.fit(&mut |_| ()).map_err(ReproduceError::other)?;
         // A verifier reads its model from a file.
         let path = folder.path().join(format!("{at}.toml"));
-        fs::write(&path, fitted.model).map_err(other)?;
+        fs::write(&path, fitted.model).map_err(ReproduceError::other)?;
         let settings = format!("{settings}\nmodel = '{}'", path.display());
         judges.push(build(&settings, SEED, |value, context| {
             lab.registry.build_verifier(plugin, Some(value), context)
@@ -300,15 +307,11 @@ fn build<T>(
     seed: u64,
     make: impl FnOnce(Value<'_>, &Context) -> Result<T, ConfigError>,
 ) -> Result<T, ReproduceError> {
-    let table = DeTable::parse(settings).map_err(other)?;
+    let table = DeTable::parse(settings).map_err(ReproduceError::other)?;
     let value = Spanned::new(table.span(), DeValue::Table(table.into_inner()));
     let wheels = DiffDrive { half_separation_m: 0.167, slip: 0.02 };
-    make(value, &Context::new(seed, ".", wheels)).map_err(|e| other(e.message))
-}
-
-/// Returns an error of another crate as one of an experiment.
-pub(super) fn other(error: impl ToString) -> ReproduceError {
-    ReproduceError::Other(error.to_string())
+    make(value, &Context::new(seed, ".", wheels))
+        .map_err(|error| ReproduceError::other(error.message))
 }
 
 #[cfg(test)]

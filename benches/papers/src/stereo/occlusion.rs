@@ -1,9 +1,11 @@
 //! P4, Fig. 7: identities after full occlusions.
 
+use tagalong_report::{Cell, Row, Table};
 use tagalong_trials::{Outcome, Trial, TrialError, occlusions, outcome};
 
 use super::{PIPELINES, STEREO};
-use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
+use crate::findings::Findings;
+use crate::lab::{Lab, ReproduceError};
 
 /// Edges of the bins of the duration, s.
 const HIDDEN_S: [f64; 4] = [0.0, 1.0, 2.0, 4.0];

@@ -2,12 +2,14 @@
 
 use tagalong_eval::percentile;
 use tagalong_pipeline::FrameReport;
+use tagalong_report::{Cell, Row, Table};
 use tagalong_trials::{Contender, Moment, Trial};
 use toml::Value;
 
 use super::STEREO;
 use super::variants::replaced;
-use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
+use crate::findings::Findings;
+use crate::lab::{Lab, ReproduceError};
 
 /// Rows of the paper's table, with the corresponding preprocessors and stages.
 const GROUPS: [(&str, &[&str]); 4] = [
@@ -95,8 +97,6 @@ pub fn boundary_points(lab: &Lab) -> Result<Findings, ReproduceError> {
     let forms = [("with three boundary points", printed), ("compared everywhere", everywhere)];
     let contenders: Vec<Contender> = forms.iter().map(|(_, form)| form.clone()).collect();
     let frames = frames(lab, &contenders)?;
-    let discovery =
-        |at: usize| -> Vec<f64> { frames[at].iter().map(|groups| groups[DETECTION]).collect() };
     Ok(Table {
         title: "Time of person detection at 512x384, by where silhouettes are compared (P4, \
                 section II-B)"
@@ -104,7 +104,7 @@ pub fn boundary_points(lab: &Lab) -> Result<Findings, ReproduceError> {
         columns: vec!["median ms".into(), "95 % below ms".into()],
         rows: (0..forms.len())
             .map(|at| {
-                let times = discovery(at);
+                let times: Vec<f64> = frames[at].iter().map(|groups| groups[DETECTION]).collect();
                 let time = |part| Cell::number(percentile(&times, part).unwrap_or(f64::NAN), 1);
                 Row::ours(forms[at].0, vec![time(0.5), time(0.95)])
             })
@@ -159,10 +159,10 @@ fn groups(report: &FrameReport) -> [f64; 4] {
 }
 
 fn cells(frames: &[[f64; 4]], part: f64) -> Vec<Cell> {
-    let number = |values: Vec<f64>| Cell::number(percentile(&values, part).unwrap_or(f64::NAN), 1);
-    let group = |at: usize| number(frames.iter().map(|groups| groups[at]).collect());
-    let total = number(frames.iter().map(|groups| groups.iter().sum()).collect());
-    (0..GROUPS.len()).map(group).chain([total]).collect()
+    let groups = (0..GROUPS.len()).map(|at| frames.iter().map(|groups| groups[at]).collect());
+    let total = frames.iter().map(|groups| groups.iter().sum()).collect();
+    let columns = groups.chain([total]);
+    columns.map(|of: Vec<_>| Cell::number(percentile(&of, part).unwrap_or(f64::NAN), 1)).collect()
 }
 
 #[cfg(test)]

@@ -4,11 +4,13 @@
 use tagalong_core::Detection;
 use tagalong_geometry::{Camera, HEAD_RADIUS_M};
 use tagalong_pipeline::{Candidate, Fate};
+use tagalong_report::{Cell, Row, Table};
 use tagalong_trials::{Contender, Moment, Trial, TrialError};
 
 use super::STEREO;
 use super::variants::with;
-use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
+use crate::findings::Findings;
+use crate::lab::{Lab, ReproduceError};
 
 /// Templates of a detector: a frontal silhouette equals one from behind.
 const SUBSETS: [&[&str]; 3] = [&["along"], &["along", "left"], &["along", "left", "right"]];
@@ -161,9 +163,8 @@ fn errors(
     (0..DISTANCES_M.len())
         .map(|distance| {
             let here = images.iter().filter(|image| image.distance == distance);
-            let error =
-                |image: &TurntableImage| Some(unit(image.errors_m[pipeline]?, image.range_m));
-            Cell::mean(&here.filter_map(error).collect::<Vec<_>>(), digits)
+            let errors = here.filter_map(|i| Some(unit(i.errors_m[pipeline]?, i.range_m)));
+            Cell::mean(&errors.collect::<Vec<_>>(), digits)
         })
         .collect()
 }
@@ -172,12 +173,12 @@ fn errors(
 fn found(turns: &[Vec<TurntableImage>], which: usize) -> Vec<Cell> {
     (0..DISTANCES_M.len())
         .map(|distance| {
-            let turn = |turn: &Vec<TurntableImage>| {
+            let hits = turns.iter().map(|turn| {
                 let at = || turn.iter().filter(move |image| image.distance == distance);
                 let hits = at().filter(|image| image.errors_m[which].is_some()).count() as u64;
                 [hits, at().count() as u64]
-            };
-            Cell::clustered(&turns.iter().map(turn).collect::<Vec<_>>(), 0)
+            });
+            Cell::clustered(&hits.collect::<Vec<_>>(), 0)
         })
         .collect()
 }

@@ -5,7 +5,7 @@ use tagalong_stereo::StereoSettings;
 use tagalong_trials::Contender;
 use toml::{Table, Value};
 
-use crate::{Lab, ReproduceError};
+use crate::lab::{Lab, ReproduceError};
 
 /// A form of a system.
 #[derive(Clone, Copy, Debug)]
@@ -101,7 +101,7 @@ impl Variant {
 /// # Errors
 /// A config that is not TOML.
 pub fn table(contender: &Contender) -> Result<Table, ReproduceError> {
-    contender.config.parse().map_err(|e| ReproduceError::Other(format!("{}: {e}", contender.name)))
+    contender.config.parse().map_err(|error| ReproduceError::of(&contender.name, error))
 }
 
 /// Returns the settings of the stereo matching of a config.
@@ -110,7 +110,7 @@ pub fn table(contender: &Contender) -> Result<Table, ReproduceError> {
 /// A config that is not TOML, or has invalid settings.
 pub fn stereo_settings(contender: &Contender) -> Result<StereoSettings, ReproduceError> {
     let settings = table(contender)?.remove("stereo").unwrap_or_else(|| Table::new().into());
-    settings.try_into().map_err(|e| ReproduceError::Other(format!("{}: {e}", contender.name)))
+    settings.try_into().map_err(|error| ReproduceError::of(&contender.name, error))
 }
 
 /// Returns the contender with numbers replaced.
@@ -129,12 +129,13 @@ pub fn replaced<'a>(
     contender: &Contender,
     set: impl Iterator<Item = (&'a str, Value)>,
 ) -> Result<Contender, ReproduceError> {
-    let wrong = |key: &str| {
-        ReproduceError::Other(format!("{}: nothing can be set at `{key}`", contender.name))
-    };
     let mut config = table(contender)?;
     for (key, value) in set {
-        *find(&mut config, key).ok_or_else(|| wrong(key))? = value;
+        let Some(place) = find(&mut config, key) else {
+            let why = format!("nothing can be set at `{key}`");
+            return Err(ReproduceError::of(&contender.name, why));
+        };
+        *place = value;
     }
     Ok(Contender { config: config.to_string(), ..contender.clone() })
 }

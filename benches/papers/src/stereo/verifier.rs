@@ -6,12 +6,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Point2;
 use tagalong_core::{Detection, Track};
 use tagalong_pipeline::{Fate, FrameReport};
+use tagalong_report::{Cell, Row, Table};
 use tagalong_sim::{Furniture, FurnitureKind, Truth};
 use tagalong_trials::{Moment, Trial, TrialError};
 
 use super::STEREO;
+use crate::findings::Findings;
+use crate::lab::{Lab, ReproduceError};
 use crate::real::{self, NOT_TRAINED_ON, TRAINED_ON};
-use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
 
 /// A title, a scene, and its settings.
 type Sequence = (&'static str, &'static str, &'static [(&'static str, &'static str)]);
@@ -177,17 +179,17 @@ fn sightings_table(rows: Vec<Row>, simulated: &str) -> Table {
 fn things_table(tallies: &[Tally]) -> Table {
     let kinds: BTreeSet<&str> =
         tallies.iter().flat_map(|tally| tally.things.keys().copied()).collect();
-    let row = |kind: &str| {
+    let removed = PIPELINES[1..].iter().map(|name| format!("{name}: removed %"));
+    let rows = kinds.into_iter().map(|kind| {
         let of = |tally: &Tally| tally.things.get(kind).copied().unwrap_or_default();
         let before = Cell::number(of(&tallies[0])[0] as f64, 0);
         let removed = tallies[1..].iter().map(|tally| share(of(tally)));
         Row::ours(kind, std::iter::once(before).chain(removed).collect())
-    };
-    let removed = PIPELINES[1..].iter().map(|name| format!("{name}: removed %"));
+    });
     Table {
         title: "False sightings by what stands there".into(),
         columns: std::iter::once(format!("{}: sightings", PIPELINES[0])).chain(removed).collect(),
-        rows: kinds.into_iter().map(row).collect(),
+        rows: rows.collect(),
         notes: vec![
             format!(
                 "Shaped to be taken for people: {}.",
@@ -226,7 +228,7 @@ fn tallies(trial: Trial) -> Result<Vec<Tally>, TrialError> {
         both.map(|(moment, report)| covered(moment, report)).collect()
     };
     let plain = covers(0);
-    let of_run = |run: usize| {
+    let tallies = (0..trial.runs.len()).map(|run| {
         let mut tally = Tally::default();
         let mut false_tracks = BTreeSet::new();
         for (moment, report) in trial.moments.iter().zip(&trial.runs[run].reports) {
@@ -235,8 +237,8 @@ fn tallies(trial: Trial) -> Result<Vec<Tally>, TrialError> {
         tally.false_tracks = false_tracks.len() as u64;
         tally.compare(&plain, &covers(run));
         tally
-    };
-    Ok((0..trial.runs.len()).map(of_run).collect())
+    });
+    Ok(tallies.collect())
 }
 
 impl Tally {
@@ -373,10 +375,10 @@ fn off_m(track: &Track, truth: &Truth) -> f64 {
 
 /// Returns the people that count and have a confirmed track.
 fn covered(moment: &Moment, report: &FrameReport) -> BTreeSet<u16> {
-    let tracks = || report.tracks.iter().filter(|track| track.confirmed);
-    let has_one = |truth: &&Truth| tracks().any(|track| off_m(track, truth) <= SAME_M);
+    let tracks: Vec<_> = report.tracks.iter().filter(|track| track.confirmed).collect();
     let people = moment.truth.iter().filter(|truth| !truth.ignore);
-    people.filter(has_one).map(|truth| truth.id).collect()
+    let found = people.filter(|truth| tracks.iter().any(|track| off_m(track, truth) <= SAME_M));
+    found.map(|truth| truth.id).collect()
 }
 
 #[cfg(test)]

@@ -2,12 +2,14 @@
 
 use nalgebra::{Point2, Vector2};
 use tagalong_eval::{PositionError, draws_interval, percentile};
+use tagalong_report::{Cell, Row, Table};
 use tagalong_sim::Scene;
 use tagalong_trials::{Judge, Moment, Trial, TrialError};
 
 use super::STEREO;
 use super::variants::{OF_P1, OF_P4, Variant};
-use crate::{Cell, Findings, Lab, ReproduceError, Row, Table};
+use crate::findings::Findings;
+use crate::lab::{Lab, ReproduceError};
 
 /// Errors of one contender on one walk, m.
 #[derive(Clone, Debug, Default)]
@@ -154,7 +156,7 @@ fn errors(mut trial: Trial) -> Result<Walk, TrialError> {
     let pace = kept_pace(&trial.moments, walker);
     only_the_walker_counts(&mut trial);
     let judge = Judge { coasting: true, ..Judge::default() };
-    let of_run = |run| {
+    let errors = trial.runs.iter().map(|run| {
         let judged = judge.judge(&trial, run)?;
         let scores = judged.tally.scores();
         Ok(Errors {
@@ -163,8 +165,8 @@ fn errors(mut trial: Trial) -> Result<Walk, TrialError> {
             frames: scores.truths,
             without: scores.fn_,
         })
-    };
-    let errors = trial.runs.iter().map(of_run).collect::<Result<_, TrialError>>()?;
+    });
+    let errors = errors.collect::<Result<_, TrialError>>()?;
     Ok(Walk { errors, drift, pace })
 }
 
@@ -229,8 +231,8 @@ fn table(walks: &[Walk], variants: &[Variant]) -> Table {
     for (at, Variant { name, .. }) in variants.iter().enumerate() {
         let of =
             |frame: fn(&Errors) -> &[f64]| walks.iter().map(|w| frame(&w.errors[at])).collect();
-        let lost = |w: &Walk| [w.errors[at].without, w.errors[at].frames];
-        let without = Cell::clustered(&walks.iter().map(lost).collect::<Vec<_>>(), 1);
+        let lost = walks.iter().map(|w| [w.errors[at].without, w.errors[at].frames]);
+        let without = Cell::clustered(&lost.collect::<Vec<_>>(), 1);
         let mut row = |frame: &str, errors: Walks<'_>| {
             let cells = cells(&errors).into_iter().chain([without.clone()]).collect();
             rows.push(Row::ours(format!("{name}, frame of the {frame}"), cells));

@@ -204,8 +204,9 @@ mod tests {
                 .collect();
             let fix = triangulate(&stations, &sights, 0.01).unwrap();
             let cost = |at: Point2<f64>| -> f64 {
-                let off = |s: &Sight| stations[s.station].bearing(&s.pixel) - stations[s.station].towards(&at);
-                sights.iter().map(|s| wrapped(off(s)).powi(2)).sum()
+                let seen = sights.iter().map(|s| (&stations[s.station], s.pixel));
+                let off = seen.map(|(from, pixel)| from.bearing(&pixel) - from.towards(&at));
+                off.map(|off| wrapped(off).powi(2)).sum()
             };
             for step in [[1e-3, 0.0], [-1e-3, 0.0], [0.0, 1e-3], [0.0, -1e-3]] {
                 prop_assert!(cost(fix.place + Vector2::from(step)) >= cost(fix.place) - 1e-12);

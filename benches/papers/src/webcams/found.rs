@@ -54,19 +54,16 @@ impl TriangulationResult {
         measured: usize,
     ) -> Self {
         let rows = calibrated.stations.iter().zip(&calibrated.places).zip(&calibrated.misfit_rad);
-        let camera = |((station, places), misfit): ((_, &usize), &f64)| {
-            let station: &crate::triangulate::Station = station;
-            CameraFound {
-                at_m: station.at.coords.into(),
-                heading_deg: station.heading_rad.to_degrees(),
-                pitch_down_deg: station.pitch_down_rad.to_degrees(),
-                focal_px: station.focal_px,
-                places: *places,
-                misfit_deg: misfit.to_degrees(),
-            }
-        };
+        let found = rows.map(|((station, places), misfit)| CameraFound {
+            at_m: station.at.coords.into(),
+            heading_deg: station.heading_rad.to_degrees(),
+            pitch_down_deg: station.pitch_down_rad.to_degrees(),
+            focal_px: station.focal_px,
+            places: *places,
+            misfit_deg: misfit.to_degrees(),
+        });
         Self {
-            cameras: rows.map(camera).collect(),
+            cameras: found.collect(),
             as_guessed: Distance::of(guess, used),
             calibrated: Distance::of(cameras, used),
             held_out: Distance::of(cameras, held),

@@ -197,16 +197,13 @@ fn true_places(log: &Path, seen: &CameraSightings) -> Result<Places, Failure> {
 /// Returns the moments with a known place.
 fn known(moments: &[(Stamp, Vec<Sight>)], places: &Places) -> Vec<Known> {
     let within = (1e9 * KNOWN_WITHIN_S) as u64;
-    let nearest = |at: u64| {
+    let known = moments.iter().filter_map(|(stamp, sights)| {
+        let at = stamp.nanos();
         let near = places.range(at.saturating_sub(within)..=at.saturating_add(within));
-        near.min_by_key(|(stamp, _)| stamp.abs_diff(at)).map(|(_, place)| *place)
-    };
-    moments
-        .iter()
-        .filter_map(|(stamp, sights)| {
-            Some(Known { place: nearest(stamp.nanos())?, sights: sights.clone() })
-        })
-        .collect()
+        let (_, place) = near.min_by_key(|(stamp, _)| stamp.abs_diff(at))?;
+        Some(Known { place: *place, sights: sights.clone() })
+    });
+    known.collect()
 }
 
 /// Splits the places into one in `every` to calibrate with, and the others.

@@ -82,7 +82,7 @@ impl CameraSightings {
 
     /// Converts the guess to stations, with the lenses of the log where it has them.
     pub(super) fn stations(&self, guess: &[WebcamSettings]) -> Vec<Station> {
-        let station = |(number, guess): (usize, &WebcamSettings)| {
+        let stations = guess.iter().enumerate().map(|(number, guess)| {
             let (width, height) =
                 self.sizes.get(&number).copied().unwrap_or((guess.width, guess.height));
             let middle = Point2::new(0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0));
@@ -96,8 +96,8 @@ impl CameraSightings {
                 focal_px,
                 centre_px,
             }
-        };
-        guess.iter().enumerate().map(station).collect()
+        });
+        stations.collect()
     }
 }
 

@@ -5,7 +5,7 @@ use std::str::FromStr;
 use crate::triangulate::Fix;
 use nalgebra::{Isometry2, Point2, Vector2};
 use tagalong_app::outcome::Failure;
-use tagalong_app::scoring::{Shot, Shots};
+use tagalong_app::scoring::Shots;
 use tagalong_app::serialize::to_json_line;
 use tagalong_core::Stamp;
 use tagalong_log::{InputSettings, Limits, TruthFrame, TruthPerson};
@@ -45,7 +45,7 @@ pub(super) fn frames(
     fixes: &[(Stamp, Fix)],
 ) -> Result<Vec<TruthFrame>, Failure> {
     let shots = Shots::read(&args.log, &InputSettings::default(), &Limits::default())?;
-    let frame = |shot: &Shot| {
+    let frames = shots.iter().map(|shot| {
         let robot = match (args.robot, shots.first()) {
             // From the start on, odometry gives the robot's pose.
             (Some(Standing(start)), Some(first)) => {
@@ -66,8 +66,8 @@ pub(super) fn frames(
             }
         });
         Some(TruthFrame { stamp_ns: shot.stamp_ns, people: person.into_iter().collect() })
-    };
-    let frames: Option<Vec<TruthFrame>> = shots.iter().map(frame).collect();
+    });
+    let frames: Option<Vec<TruthFrame>> = frames.collect();
     frames.ok_or_else(|| {
         Failure::usage("nothing says where the robot stands in the room: say it with --robot")
     })

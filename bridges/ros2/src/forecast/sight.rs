@@ -87,32 +87,25 @@ mod tests {
 
     use nalgebra::Isometry3;
     use tagalong::core::{EgoMotion, Images, Stamp, UnreadRay};
-    use tagalong::geometry::{Camera, Pinhole};
+    use tagalong::geometry::Camera;
 
     use super::*;
-
-    fn frame(depth: Option<DepthImage>) -> Frame {
-        // 90 degrees wide, at the height of a table.
-        let lens = Pinhole::centred(80.0, 160, 120);
-        let camera = Camera::mounted(lens, 160, 120, 1.0, 0.0, 0.0);
-        let images = Images { depth: depth.map(Arc::new), ..Images::default() };
-        let motion = EgoMotion::at_rest(0.1);
-        Frame::new(1, Stamp::default(), Arc::new(camera), motion, images)
-    }
+    use crate::forecast::tests::frame_at;
 
     #[test]
     fn a_camera_sees_what_is_in_its_image_and_not_behind_a_surface() {
         let wall = DepthImage::filled(160, 120, 3.0);
         let seen = |frame: &Frame, x, y| Sight::new(frame).sees(&Point2::new(x, y));
-        let before = frame(Some(wall.clone()));
+        let before = frame_at(0.0, Some(wall.clone()));
         assert!(seen(&before, 2.0, 0.0) && seen(&before, 3.3, 0.0));
         assert!(!seen(&before, 3.5, 0.0), "behind the wall");
         assert!(!seen(&before, -2.0, 0.0), "behind the camera");
         assert!(seen(&before, 2.0, 1.9) && !seen(&before, 2.0, 2.1), "beside the image");
         let mut dark = wall;
         dark.pixels_mut().fill(f32::NAN);
-        assert!(!seen(&frame(Some(dark)), 2.0, 0.0), "no reading says nothing");
-        assert!(seen(&frame(None), 9.0, 0.0) && !seen(&frame(None), 11.0, 0.0), "without depth");
+        assert!(!seen(&frame_at(0.0, Some(dark)), 2.0, 0.0), "no reading says nothing");
+        let blind = frame_at(0.0, None);
+        assert!(seen(&blind, 9.0, 0.0) && !seen(&blind, 11.0, 0.0), "without depth");
     }
 
     #[test]

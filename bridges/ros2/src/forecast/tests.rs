@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry2, Point3, SMatrix, Vector2};
-use tagalong::core::{EgoMotion, Estimate, Frame, Images, Person, TrackId};
+use tagalong::core::{DepthImage, EgoMotion, Estimate, Frame, Images, Person, TrackId};
 use tagalong::geometry::{Camera, Pinhole, Rect};
 
 use super::*;
@@ -22,24 +22,28 @@ fn person(at: [f64; 2], velocity: [f64; 2], deviations: [f64; 2]) -> Track {
     Track::new(TrackId(1), Estimate::new(person, covariance, Rect::default()), 3.0).with_age(10)
 }
 
-fn frame_at(stamp_s: f64) -> Frame {
+/// Makes two entries of the state of a person vary together.
+fn couple(track: &mut Track, [first, second]: [usize; 2], covariance: f64) {
+    track.estimate.covariance[(first, second)] = covariance;
+    track.estimate.covariance[(second, first)] = covariance;
+}
+
+/// Returns a frame of a camera that is 90 degrees wide, at the height of a table.
+pub(super) fn frame_at(stamp_s: f64, depth: Option<DepthImage>) -> Frame {
     let lens = Pinhole::centred(80.0, 160, 120);
     let camera = Camera::mounted(lens, 160, 120, 1.0, 0.0, 0.0);
     let stamp = Stamp::from_nanos((stamp_s * 1e9) as u64);
-    Frame::new(1, stamp, Arc::new(camera), EgoMotion::at_rest(0.1), Images::default())
+    let images = Images { depth: depth.map(Arc::new), ..Images::default() };
+    Frame::new(1, stamp, Arc::new(camera), EgoMotion::at_rest(0.1), images)
+}
+
+fn now<'a>(frame: &'a Frame, tracks: &'a [Track], robot: &'a Isometry2<f64>) -> Now<'a> {
+    Now { frame, tracks, odom_from_robot: robot, base_frame: "base_link", world: "odom" }
 }
 
 fn made(settings: &ForecastSettings, tracks: &[Track], robot: Isometry2<f64>) -> OccupancyGrid {
-    let frame = frame_at(7.0);
-    let now = Now {
-        frame: &frame,
-        tracks,
-        odom_from_robot: &robot,
-        base_frame: "base_link",
-        world: "odom",
-    };
     // The robot sees what is ahead of it.
-    grid(settings, now, |at| at.x > 0.0)
+    grid(settings, now(&frame_at(7.0, None), tracks, &robot), |at| at.x > 0.0)
 }
 
 /// Returns the value of the cell at a place in the frame of the grid.
@@ -96,8 +100,7 @@ fn uncertain_velocity_spreads_with_time() {
     // A person on the left that walks to the left is farther to the left later: more spread.
     let coupled = |covariance| {
         let mut track = person([0.5, 0.0], [1.0, 0.0], [0.3, 0.4]);
-        track.estimate.covariance[(1, 4)] = covariance;
-        track.estimate.covariance[(4, 1)] = covariance;
+        couple(&mut track, [1, 4], covariance);
         value(&made(&SETTINGS, &[track], Isometry2::identity()), 1.55, 0.05)
     };
     assert!(coupled(-0.1) > coupled(0.0) && coupled(0.0) > coupled(0.1));
@@ -109,8 +112,7 @@ fn the_chance_of_all_cells_is_the_area_near_a_person() {
     let mut tracks = [person([3.0, 0.0], [0.0, 0.0], [0.0, 0.0])];
     tracks[0].estimate.covariance[(0, 0)] = 0.3;
     tracks[0].estimate.covariance[(1, 1)] = 0.7;
-    tracks[0].estimate.covariance[(0, 1)] = 0.2;
-    tracks[0].estimate.covariance[(1, 0)] = 0.2;
+    couple(&mut tracks[0], [0, 1], 0.2);
     let grid = made(&SETTINGS, &tracks, Isometry2::identity());
     let sum: f64 = grid.data.iter().map(|percent| f64::from((*percent).max(0))).sum();
     let area = sum / 100.0 * 0.1 * 0.1;
@@ -146,8 +148,7 @@ fn the_grid_stands_in_its_frame_around_the_robot() {
 #[test]
 fn a_person_with_a_covariance_that_is_none_stays_where_the_filter_says() {
     let mut broken = person([3.0, 0.0], [0.0, 0.0], [0.0, 0.0]);
-    broken.estimate.covariance[(0, 1)] = 9.0;
-    broken.estimate.covariance[(1, 0)] = 9.0;
+    couple(&mut broken, [0, 1], 9.0);
     let grid = made(&SETTINGS, &[broken], Isometry2::identity());
     assert_eq!((value(&grid, 3.05, 0.05), value(&grid, 3.05, 2.05)), (100, 0));
 }
@@ -158,26 +159,11 @@ fn a_grid_comes_at_most_five_times_a_second() {
     let mut forecast = Forecast::new(SETTINGS);
     let mut count = 0;
     for tenth in 0..20 {
-        let frame = frame_at(5.0 + 0.1 * f64::from(tenth) + 1e-4);
-        let now = Now {
-            frame: &frame,
-            tracks: &[],
-            odom_from_robot: &robot,
-            base_frame: "base_link",
-            world: "odom",
-        };
-        count += usize::from(forecast.grid(now).is_some());
+        let frame = frame_at(5.0 + 0.1 * f64::from(tenth) + 1e-4, None);
+        count += usize::from(forecast.grid(now(&frame, &[], &robot)).is_some());
     }
     // By rounding of stamps one in three frames, or two.
     assert!((7..=10).contains(&count), "{count}");
     // A clock that goes back ends no forecast.
-    let frame = frame_at(1.0);
-    let now = Now {
-        frame: &frame,
-        tracks: &[],
-        odom_from_robot: &robot,
-        base_frame: "base_link",
-        world: "odom",
-    };
-    assert!(forecast.grid(now).is_some());
+    assert!(forecast.grid(now(&frame_at(1.0, None), &[], &robot)).is_some());
 }

@@ -145,7 +145,7 @@ mod tests {
 
     /// A ride of 20 s at 1 m/s along X, a tick every 0.02 s, changed by `change`.
     fn ride(change: impl Fn(f64, &mut Tick, &mut CrowdView)) -> CrowdMeasures {
-        let tick = |i: u32| {
+        let ticks = (0..1000).map(|i| {
             let at_s = f64::from(i) * 0.02;
             let mut view = CrowdView {
                 world_from_robot: Isometry2::translation(at_s, 3.0),
@@ -166,8 +166,8 @@ mod tests {
             change(at_s, &mut tick, &mut view);
             tick.crowd = Some(view);
             tick
-        };
-        CrowdMeasures::of(&(0..1000).map(tick).collect::<Vec<_>>()).unwrap()
+        });
+        CrowdMeasures::of(&ticks.collect::<Vec<_>>()).unwrap()
     }
 
     fn near(a: f64, b: f64) -> bool {

@@ -156,10 +156,11 @@ impl RideJudge {
             (Some(range_m), Some(stand_off_m)) => (range_m - stand_off_m).abs() <= self.off_m,
             _ => false,
         };
-        let farther = |l: &JudgedFrame| Some(l.dt_s * (l.range_m? - ride.stand_off_m?));
         let slow_s = sum(&slow);
         // Distance to the person counts only while they are slow enough to be kept up with.
-        let farther_ms: f64 = looks.iter().filter(|l| slow(l)).filter_map(farther).sum();
+        let slowly = looks.iter().filter(|look| slow(look));
+        let farther = slowly.filter_map(|l| Some(l.dt_s * (l.range_m? - ride.stand_off_m?)));
+        let farther_ms: f64 = farther.sum();
         let moving = || ride.ticks.iter().filter(|tick| tick.speed_mps.abs() > MOVES_MPS);
         let episodes = episodes(&looks);
         let first_s = looks.first().map_or(0.0, |look| look.at_s);
@@ -221,7 +222,8 @@ impl RideJudge {
         let places: Vec<_> = ride.moments.iter().map(place).collect();
         let seconds: Vec<f64> =
             ride.moments.iter().map(|m| m.stamp.nanos() as f64 * 1e-9).collect();
-        let look = |(at, (moment, report)): (usize, (&Moment, &FrameReport))| {
+        let seen = ride.moments.iter().zip(&ride.reports).enumerate();
+        let looks = seen.map(|(at, (moment, report))| {
             before = self.whom(moment, report, before);
             let truth = person(moment);
             let next_s = seconds.get(at + 1).copied().unwrap_or(seconds[at]);
@@ -234,8 +236,8 @@ impl RideJudge {
                 range_m: truth.map(|truth| truth.head_in_robot.xy().coords.norm()),
                 speed_mps: speed(&places, &seconds, at),
             }
-        };
-        ride.moments.iter().zip(&ride.reports).enumerate().map(look).collect()
+        });
+        looks.collect()
     }
 
     fn is_in_view(&self, truth: &Truth) -> bool {
@@ -444,28 +446,14 @@ mod tests {
         assert_eq!((judge.refound(&late, 6.0), judge.refound(&late, 8.0)), (None, Some(false)));
     }
 
+    fn tick(speed_mps: f64, turn_rate: f64, reason: Option<Reason>) -> Tick {
+        let clearance = Clearance { people_m: 1.0, things_m: 1.0 };
+        Tick { at_s: 0.0, speed_mps, turn_rate, clearance, approach: None, reason, crowd: None }
+    }
+
     #[test]
     fn a_robot_that_never_moves_names_the_reason_and_keeps_no_person_that_goes_away() {
-        let tick = |speed_mps, turn_rate, reason| Tick {
-            at_s: 0.0,
-            speed_mps,
-            turn_rate,
-            clearance: Clearance { people_m: 1.0, things_m: 1.0 },
-            approach: None,
-            reason,
-            crowd: None,
-        };
-        let silent = Some(Reason::Silent);
-        let ticks = [tick(0.0, 0.0, None), tick(0.0, 0.0, silent), tick(0.01, 0.0, silent)];
-        assert_eq!(never_moved(&ticks), Some("silent"));
-        let shares = reasons(&[ticks.as_slice(), &[tick(0.2, 0.0, Some(Reason::Near))]].concat());
-        let shares: Vec<_> = shares.iter().map(|it| (it.reason, it.effect, it.share)).collect();
-        let expected =
-            [("silent", "stands", 0.5), ("near", "slower", 0.25), ("no command", "stands", 0.25)];
-        assert_eq!(shares, expected);
-        assert_eq!(never_moved(&[ticks[0], tick(0.2, 0.0, silent)]), None, "it drives");
-        assert_eq!(never_moved(&[ticks[0], tick(0.0, 0.9, silent)]), None, "it turns");
-        let kept = |range_m: f64, speed_mps: f64| {
+        fn kept(range_m: f64, speed_mps: f64) -> bool {
             let heads = [(range_m, 0.0, 1.0); 10];
             let places = [Some((range_m, 0.0)); 10];
             let mut trial = trial(&[&heads], &[(7, &places)]);
@@ -479,12 +467,23 @@ mod tests {
                 moments: trial.moments,
                 reports,
                 took_ms: Vec::new(),
-                ticks: vec![tick(speed_mps, 0.0, silent)],
+                ticks: vec![tick(speed_mps, 0.0, Some(Reason::Silent))],
                 in_view: Vec::new(),
                 faults: Vec::new(),
             };
             RideJudge::default().judge(&ride).kept
-        };
+        }
+
+        let silent = Some(Reason::Silent);
+        let ticks = [tick(0.0, 0.0, None), tick(0.0, 0.0, silent), tick(0.01, 0.0, silent)];
+        assert_eq!(never_moved(&ticks), Some("silent"));
+        let shares = reasons(&[ticks.as_slice(), &[tick(0.2, 0.0, Some(Reason::Near))]].concat());
+        let shares: Vec<_> = shares.iter().map(|it| (it.reason, it.effect, it.share)).collect();
+        let expected =
+            [("silent", "stands", 0.5), ("near", "slower", 0.25), ("no command", "stands", 0.25)];
+        assert_eq!(shares, expected);
+        assert_eq!(never_moved(&[ticks[0], tick(0.2, 0.0, silent)]), None, "it drives");
+        assert_eq!(never_moved(&[ticks[0], tick(0.0, 0.9, silent)]), None, "it turns");
         assert!(kept(1.5, 0.0), "a person at the distance to keep is no reason to move");
         assert!(!kept(3.0, 0.0), "the robot stayed behind");
         assert!(kept(3.0, 0.3), "it drove");
@@ -499,41 +498,25 @@ mod tests {
 
     #[test]
     fn the_nearest_time_is_that_of_the_least_room_to_anything() {
-        fn tick(at_s: f64, people_m: f64, things_m: f64) -> Tick {
-            Tick {
-                at_s,
-                speed_mps: 0.5,
-                turn_rate: 0.0,
-                clearance: Clearance { people_m, things_m },
-                approach: None,
-                reason: None,
-                crowd: None,
-            }
+        fn near(at_s: f64, people_m: f64, things_m: f64) -> Tick {
+            Tick { at_s, clearance: Clearance { people_m, things_m }, ..tick(0.5, 0.0, None) }
         }
 
-        let ticks = [tick(0.1, 1.0, 2.0), tick(0.2, f64::INFINITY, 0.4), tick(0.3, 0.5, 2.0)];
+        let ticks = [near(0.1, 1.0, 2.0), near(0.2, f64::INFINITY, 0.4), near(0.3, 0.5, 2.0)];
         assert_eq!(nearest_s(ticks.iter()), Some(0.2));
-        let alone = [tick(0.1, f64::INFINITY, f64::INFINITY)];
+        let alone = [near(0.1, f64::INFINITY, f64::INFINITY)];
         assert_eq!(nearest_s(alone.iter()), None);
     }
 
     #[test]
     fn a_steady_speed_has_no_jerk_and_a_sudden_stop_has() {
-        let clearance = Clearance { people_m: 1.0, things_m: 1.0 };
-        let ride = |speed: &dyn Fn(usize) -> f64| -> Vec<Tick> {
-            let tick = |i: usize| Tick {
-                at_s: i as f64 * 0.02,
-                speed_mps: speed(i),
-                turn_rate: 0.0,
-                clearance,
-                crowd: None,
-                approach: None,
-                reason: None,
-            };
-            (0..200).map(tick).collect()
-        };
-        assert!(jerk(&ride(&|_| 0.5)) < 1e-9);
-        assert!(jerk(&ride(&|i| 0.002 * i as f64)) < 1e-6);
-        assert!(jerk(&ride(&|i| if i < 100 { 0.5 } else { 0.0 })) > 5.0);
+        fn ride(speed: impl Fn(u32) -> f64) -> Vec<Tick> {
+            let ticks = (0..200).map(|i| (0.02 * f64::from(i), speed(i)));
+            ticks.map(|(at_s, speed_mps)| Tick { at_s, ..tick(speed_mps, 0.0, None) }).collect()
+        }
+
+        assert!(jerk(&ride(|_| 0.5)) < 1e-9);
+        assert!(jerk(&ride(|i| 0.002 * f64::from(i))) < 1e-6);
+        assert!(jerk(&ride(|i| if i < 100 { 0.5 } else { 0.0 })) > 5.0);
     }
 }

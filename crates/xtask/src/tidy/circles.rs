@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::Result;
 
+use crate::metadata::Metadata;
 use crate::workspace::Workspace;
 
 /// Most files in a circle that are not of one module.
@@ -21,14 +22,19 @@ type Names = Vec<String>;
 /// Paths that a module names, and whether it exports them.
 type Uses = Vec<(bool, Names)>;
 
-/// Complains about circles of files.
-pub fn check(workspace: &Workspace) -> Result<Vec<String>> {
-    let mut crates: BTreeMap<String, BTreeMap<Names, Uses>> = BTreeMap::new();
+/// Modules of a crate, with the paths that each names.
+type Modules = BTreeMap<Names, Uses>;
+
+/// Complains about circles of files in the members of the workspace.
+pub fn check(workspace: &Workspace, metadata: &Metadata) -> Result<Vec<String>> {
+    let members = metadata.members(workspace.root());
+    let mut crates: BTreeMap<String, Modules> = BTreeMap::new();
     for path in workspace.files()? {
         let file = path.display().to_string().replace('\\', "/");
-        let Some((folder, module)) = place(&file) else { continue };
-        let uses = uses(&workspace.read(&path)?);
-        crates.entry(folder.to_owned()).or_default().insert(module, uses);
+        if let Some((folder, module)) = place(&file).filter(|(of, _)| members.contains_key(*of)) {
+            let modules = crates.entry(folder.to_owned()).or_default();
+            add_module(modules, module, &workspace.read(&path)?);
+        }
     }
     let mut complaints = Vec::new();
     for (folder, modules) in &crates {
@@ -47,13 +53,18 @@ pub fn check(workspace: &Workspace) -> Result<Vec<String>> {
     Ok(complaints)
 }
 
+/// Adds a file to the modules of its crate.
+fn add_module(modules: &mut Modules, module: Names, text: &str) {
+    // A program beside a library is another crate. Its `main.rs` comes after `lib.rs`.
+    modules.entry(module).or_insert_with(|| uses(text));
+}
+
 /// Returns the folder of the crate of a source file, and its module; `None` for tests and others.
 fn place(file: &str) -> Option<(&str, Names)> {
     let (folder, rest) = file.split_once("/src/")?;
     let module = rest.strip_suffix(".rs")?;
-    let in_product = folder.starts_with("crates/") || folder.starts_with("plugins/");
     let mut names: Names = module.split('/').map(String::from).collect();
-    if !in_product || names[0] == "bin" || names.iter().any(|name| name == "tests") {
+    if names[0] == "bin" || names.iter().any(|name| name == "tests") {
         return None;
     }
     if names.last().is_some_and(|name| ["lib", "main", "mod"].contains(&name.as_str())) {
@@ -151,7 +162,7 @@ fn add_paths(code: &str, uses: &mut Uses) {
 }
 
 /// Returns the circles of the modules of a crate.
-fn circles(modules: &BTreeMap<Names, Uses>) -> Vec<BTreeSet<&Names>> {
+fn circles(modules: &Modules) -> Vec<BTreeSet<&Names>> {
     let arrows: BTreeMap<&Names, BTreeSet<&Names>> =
         modules.keys().map(|module| (module, arrows(module, modules))).collect();
     let reached: BTreeMap<&Names, BTreeSet<&Names>> =
@@ -188,7 +199,7 @@ fn reached<'a>(
 }
 
 /// Returns the modules that a module uses; to export from below is no use.
-fn arrows<'a>(module: &Names, modules: &'a BTreeMap<Names, Uses>) -> BTreeSet<&'a Names> {
+fn arrows<'a>(module: &Names, modules: &'a Modules) -> BTreeSet<&'a Names> {
     let mut arrows = BTreeSet::new();
     for (is_exported, path) in &modules[module] {
         let target = absolute(module, path, modules).and_then(|path| defining(&path, modules, 0));
@@ -202,7 +213,7 @@ fn arrows<'a>(module: &Names, modules: &'a BTreeMap<Names, Uses>) -> BTreeSet<&'
 }
 
 /// Returns a path from the root of the crate; `None` for those of other crates.
-fn absolute(module: &Names, path: &[String], modules: &BTreeMap<Names, Uses>) -> Option<Names> {
+fn absolute(module: &Names, path: &[String], modules: &Modules) -> Option<Names> {
     let (first, rest) = path.split_first()?;
     match first.as_str() {
         "crate" => Some(rest.to_vec()),
@@ -220,11 +231,7 @@ fn absolute(module: &Names, path: &[String], modules: &BTreeMap<Names, Uses>) ->
 }
 
 /// Returns the module in which a path ends, through re-exports.
-fn defining<'a>(
-    path: &[String],
-    modules: &'a BTreeMap<Names, Uses>,
-    depth: usize,
-) -> Option<&'a Names> {
+fn defining<'a>(path: &[String], modules: &'a Modules, depth: usize) -> Option<&'a Names> {
     let known = (0..=path.len()).rev().find_map(|end| modules.get_key_value(&path[..end]));
     let (module, uses) = known?;
     let rest = &path[module.len()..];
@@ -250,11 +257,11 @@ mod tests {
     use super::*;
 
     fn circle(files: &[(&str, &str)]) -> Vec<Vec<String>> {
-        let placed = files.iter().map(|(file, text)| {
+        let mut modules = Modules::new();
+        for (file, text) in files {
             let file = format!("crates/a/src/{file}.rs");
-            (place(&file).unwrap().1, uses(text))
-        });
-        let modules = placed.collect();
+            add_module(&mut modules, place(&file).unwrap().1, text);
+        }
         circles(&modules)
             .into_iter()
             .map(|circle| circle.iter().map(|m| m.join("::")).collect())
@@ -285,6 +292,23 @@ mod tests {
         assert!(circle(&[nested, ("a", "fn f() { crate::g(); }")]).is_empty());
     }
 
+    /// A list of systems, experiments that share a type, and a program beside the library.
+    #[test]
+    fn a_shared_type_that_knows_its_users_makes_a_circle() {
+        let lib = ("lib", "mod lab;\npub use lab::Lab;\npub use systems::SYSTEMS;");
+        let main = ("main", "mod other;\npub use other::Lab;");
+        let systems = ("systems", "use crate::{laser, stereo};");
+        let laser = ("laser", "use crate::{Lab, forms};");
+        let stereo = ("stereo/mod", "use crate::forms::Forms;\nuse crate::Lab;");
+        let files = |lab, forms| circle(&[lib, main, systems, laser, stereo, lab, forms]);
+        let lab = ("lab", "");
+        assert!(files(lab, ("forms", "use crate::lab::Lab;")).is_empty());
+        let knows = ("forms", "use crate::{laser, stereo};");
+        assert_eq!(files(lab, knows), [["forms", "laser", "stereo"]]);
+        let knows_all = ("lab", "use crate::SYSTEMS;");
+        assert_eq!(files(knows_all, ("forms", "")), [["lab", "laser", "stereo", "systems"]]);
+    }
+
     #[test]
     fn a_folder_is_one_module() {
         let [root, a, b] = ["", "a", "a::b"].map(names);
@@ -292,6 +316,8 @@ mod tests {
         assert!(!is_one_module(&BTreeSet::from([&root, &a, &b])));
         assert_eq!(place("crates/x/src/a/mod.rs"), Some(("crates/x", names("a"))));
         assert_eq!(place("crates/x/src/a/tests.rs"), None);
-        assert_eq!(place("benches/src/a.rs"), None);
+        assert_eq!(place("benches/papers/src/a/b.rs"), Some(("benches/papers", names("a::b"))));
+        assert_eq!(place("tests/src/lib.rs"), Some(("tests", Vec::new())));
+        assert_eq!(place("benches/a.rs"), None);
     }
 }

@@ -24,7 +24,7 @@ pub fn tidy(workspace: &Workspace) -> Result<()> {
     let mut complaints = arrows::check(workspace, &metadata)?;
     complaints.extend(plugins::check(workspace, &metadata)?);
     complaints.extend(licences::check(workspace, &metadata)?);
-    complaints.extend(circles::check(workspace)?);
+    complaints.extend(circles::check(workspace, &metadata)?);
     complaints.extend(files::check(workspace)?);
     complaints.extend(names::check(workspace)?);
     complaints.extend(papers::check(workspace)?);

@@ -159,7 +159,7 @@ fn hidden_by(place: &Point2<f64>, half_width_m: f64, from: &Point2<f64>, person:
     let way = person.at - from;
     let Some(sight) = way.try_normalize(1e-6) else { return 0.0 };
     let along = (place - from).dot(&sight);
-    // What is behind the person, or behind the robot, hides nothing.
+    // Things behind the person, or behind the robot, hide nothing.
     if along <= 0.0 || along >= way.norm() - PERSON_M {
         return 0.0;
     }

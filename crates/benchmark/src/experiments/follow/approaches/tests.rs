@@ -2,7 +2,7 @@ use std::collections::BTreeSet;
 
 use clap::Parser;
 use tagalong_core::{Controller, Scene as Steered, Twist};
-use tagalong_sim::ApproachBy;
+use tagalong_sim::{ApproachBy, ApproachSettings};
 use tagalong_trials::Side;
 
 use super::*;
@@ -62,6 +62,10 @@ fn ridden(controller: &str, count: u64, line: &str, threads: usize) -> Vec<Appro
 
 #[test]
 fn approaches_come_from_all_sides_at_all_speeds() {
+    fn approach(scene: &Scene) -> &ApproachSettings {
+        scene.approach.as_ref().unwrap()
+    }
+
     let args = args("--approaches 500 --faults one");
     let contenders = [unheeding("stands")];
     let paths = scenes(&args);
@@ -69,30 +73,28 @@ fn approaches_come_from_all_sides_at_all_speeds() {
     let scenes: Vec<Scene> = jobs.iter().map(|job| read_scene(job, &args).unwrap()).collect();
     assert_eq!(scenes.len(), 500);
     let count = |is: &dyn Fn(&Scene) -> bool| scenes.iter().filter(|scene| is(scene)).count();
-    let approach = |scene: &Scene| scene.approach.clone().unwrap();
     for eighth in 0..8 {
-        let is_in = |s: &Scene| (approach(s).bearing_deg / 45.0) as i32 == eighth;
-        assert!((40..90).contains(&count(&is_in)), "{eighth}: {}", count(&is_in));
+        let there = count(&|s| (approach(s).bearing_deg / 45.0) as i32 == eighth);
+        assert!((40..90).contains(&there), "{eighth}: {there}");
     }
     for seventh in 0..7 {
         let low = 0.2 + 0.2 * f64::from(seventh);
-        let is_in = |s: &Scene| (low..low + 0.2).contains(&approach(s).speed_mps);
-        assert!((45..100).contains(&count(&is_in)), "{low} m/s: {}", count(&is_in));
+        let there = count(&|s| (low..low + 0.2).contains(&approach(s).speed_mps));
+        assert!((45..100).contains(&there), "{low} m/s: {there}");
     }
     for side in Side::ALL {
-        let is_near = |s: &Scene| {
-            let approach = approach(s);
-            Side::of_bearing(approach.bearing_deg) == side && approach.distance_m() < 3.0
-        };
-        assert!(count(&is_near) > 20, "{side}");
+        let near = scenes.iter().map(approach).filter(|of| of.distance_m() < 3.0);
+        let near = near.filter(|of| Side::of_bearing(of.bearing_deg) == side);
+        assert!(near.count() > 20, "{side}");
     }
     for by in [ApproachBy::Person, ApproachBy::Trolley] {
         assert!(count(&|s| approach(s).by == by && approach(s).aims) > 90, "{by:?}");
     }
     for height_m in [0.3, 0.5, 0.8, 1.2] {
         for latency_s in [0.1, 0.4] {
-            let is = |s: &Scene| s.camera.height_m == height_m && s.robot.latency_s == latency_s;
-            assert!(count(&is) > 35, "{height_m} m, {latency_s} s: {}", count(&is));
+            let high = scenes.iter().filter(|scene| scene.camera.height_m == height_m);
+            let late = high.filter(|scene| scene.robot.latency_s == latency_s).count();
+            assert!(late > 35, "{height_m} m, {latency_s} s: {late}");
         }
     }
     assert_eq!(count(&|scene| scene.laser.is_some()), 250);

@@ -1,10 +1,84 @@
 use nalgebra::{Point2, Vector2};
-use tagalong_core::{EgoMotion, Scene};
+use tagalong_config::{Settings, check_settings};
+use tagalong_controllers::step_s;
+use tagalong_core::{Controller, EgoMotion, Input, Inputs, Result, Scene, Twist};
 
-/// Positions and speeds beyond this are no measurements, m and m/s.
+/// Above this no length or speed on the floor makes sense, whatever the unit.
 const MOST: f64 = 1e6;
 /// Distance at which a lost person is approached, m.
 const SEARCH_M: f64 = 0.2;
+
+/// The equations of a planner, by its settings.
+pub(super) trait Steering: Settings + Send {
+    /// Returns the command for one frame, within the limits.
+    fn steer(&self, now: &Situation<'_>) -> Twist;
+
+    /// Returns the distance kept from the centre of the person, m.
+    fn stand_off_m(&self) -> f64;
+}
+
+/// Input of a planner for one frame.
+pub(super) struct Situation<'a> {
+    /// Input of the controller.
+    pub(super) scene: &'a Scene<'a>,
+    /// The followed person.
+    pub(super) quarry: Quarry,
+    /// The last command.
+    pub(super) last: Twist,
+    /// Largest speed, m/s, and turn rate, rad/s, of the drive.
+    pub(super) max_mps: f64,
+    pub(super) max_rps: f64,
+    /// Time since the last command, s.
+    pub(super) dt_s: f64,
+}
+
+/// A planner as a controller, with the followed person and the last command.
+pub(super) struct Planner<S> {
+    settings: S,
+    quarry: Option<Quarry>,
+    last: Twist,
+}
+
+impl<S: Steering> Planner<S> {
+    /// Creates a planner of a robot at rest.
+    ///
+    /// # Errors
+    /// Settings outside their ranges.
+    pub(super) fn new(settings: S) -> Result<Self> {
+        check_settings(&settings)?;
+        Ok(Self { settings, quarry: None, last: Twist::STOP })
+    }
+
+    /// Returns the command for the followed person; `None` without a person or a usable drive.
+    fn steer(&self, scene: &Scene<'_>) -> Option<Twist> {
+        let quarry = self.quarry?;
+        let max_mps = scene.max_speed_mps;
+        let half_m = scene.wheels.half_separation_m;
+        if ![max_mps, half_m].iter().all(|value| *value > 0.0 && *value <= MOST) {
+            return None;
+        }
+        let max_rps = max_mps / half_m;
+        let dt_s = step_s(&scene.frame.motion);
+        let now = Situation { scene, quarry, last: self.last, max_mps, max_rps, dt_s };
+        Some(self.settings.steer(&now))
+    }
+}
+
+impl<S: Steering> Controller for Planner<S> {
+    fn inputs(&self) -> Inputs {
+        Inputs::NONE.accept(Input::Laser)
+    }
+
+    fn command(&mut self, scene: &Scene<'_>) -> Twist {
+        self.quarry = Quarry::next(self.quarry, scene);
+        self.last = self.steer(scene).unwrap_or(Twist::STOP);
+        self.last
+    }
+
+    fn stand_off_m(&self) -> Option<f64> {
+        Some(self.settings.stand_off_m())
+    }
+}
 
 /// The followed person where they were seen last, in the axes of the robot of now.
 #[derive(Clone, Copy, Debug)]
@@ -20,7 +94,7 @@ pub(super) struct Quarry {
 impl Quarry {
     /// Returns the person of this frame, or, while their track lives on, where they were seen last, moved
     /// along with the robot. `None` without a target: the search of the config comes then.
-    pub(super) fn next(before: Option<Self>, scene: &Scene<'_>) -> Option<Self> {
+    fn next(before: Option<Self>, scene: &Scene<'_>) -> Option<Self> {
         fn is_finite(place: &Point2<f64>, velocity: &Vector2<f64>) -> bool {
             place.iter().chain(velocity.iter()).all(|value| value.abs() < MOST)
         }
