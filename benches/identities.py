@@ -8,9 +8,9 @@ than when matched last. An inherited ID: a person has the ID that another person
 at an IoU of 0.4 and more, the best pairs of a frame first.
 
 Kinds, the first that fits:
-  of the one beside    inherited while the person whose ID it was is in the frame
-  of a vague track     inherited from a track that was reported in each frame since
-  recognised wrongly   inherited from a person without a track
+  recognised wrongly   inherited, and not reported in each frame since
+  of the one beside    inherited while the person whose ID it was is near in the image
+  of a vague track     inherited otherwise: a track that was predicted took a newcomer
   swapped              switched in the frame in which somebody else takes the earlier ID
   lost while hidden    switched after a frame in which another person hides a quarter or more
   lost at the border   switched after, or in, a frame in which the border cuts the person
@@ -98,14 +98,20 @@ def matches(people, tracks):
     return sorted(found)
 
 
-def kind_of_inherited(truth, reported, frame, last_person, last_frame, track):
+def are_beside(a, b):
+    """Returns true if the middles of two boxes are no more than two widths apart."""
+    return abs(a[0] + a[2] / 2 - b[0] - b[2] / 2) <= 2 * min(a[2], b[2])
+
+
+def kind_of_inherited(truth, reported, frame, person, last_person, last_frame, track):
     """Returns the kind of an inherited ID."""
-    if any(person.number == last_person for person in truth[frame]):
-        return "of the one beside"
     between = range(last_frame + 1, frame)
-    if all(track in reported.get(index, ()) for index in between):
-        return "of a vague track"
-    return "recognised wrongly"
+    if any(track not in reported.get(index, ()) for index in between):
+        return "recognised wrongly"
+    boxes = {one.number: one.box for one in truth[frame]}
+    if last_person in boxes and are_beside(boxes[person], boxes[last_person]):
+        return "of the one beside"
+    return "of a vague track"
 
 
 def kind_of_switch(truth, step_s, frame, person, last_frame, holders, last_id):
@@ -140,7 +146,8 @@ def events(truth_path, run):
                                         f"{last_frame}", kind))
             last_person, last_frame = person_of.get(track, (person, frame))
             if last_person != person:
-                kind = kind_of_inherited(truth, reported, frame, last_person, last_frame, track)
+                kind = kind_of_inherited(truth, reported, frame, person, last_person,
+                                         last_frame, track)
                 inherited.append((frame, f"person {person} has the ID {track} that person "
                                          f"{last_person} had in frame {last_frame}", kind))
             id_of[person], person_of[track] = (track, frame), (person, frame)

@@ -65,9 +65,9 @@ fn switches_have_their_kind() {
 
 #[test]
 fn two_people_who_take_each_others_ids_are_swapped() {
-    let people = [(1, 1, 100, 1.0, "0"), (1, 2, 300, 1.0, "0")];
+    let people = [(1, 1, 100, 1.0, "0"), (1, 2, 150, 1.0, "0")];
     let people = [people, people.map(|(_, id, column, visible, by)| (2, id, column, visible, by))];
-    let tracks = [(1, 5, Some(100)), (1, 6, Some(300)), (2, 6, Some(100)), (2, 5, Some(300))];
+    let tracks = [(1, 5, Some(100)), (1, 6, Some(150)), (2, 6, Some(100)), (2, 5, Some(150))];
     let Some(found) = events(people.as_flattened(), &tracks, 100) else { return };
     assert_eq!(
         found,

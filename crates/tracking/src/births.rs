@@ -12,8 +12,36 @@ use tagalong_geometry::Camera;
 
 use crate::BirthSettings;
 
-/// Removes the pairs that are less likely than a new person, and returns their number. `appearance`
-/// has the log-likelihood ratios of the appearances by track and detection, or is empty.
+/// Log-likelihood ratio with which an associator forms no pair.
+const NEVER: f64 = -1e6;
+
+/// Makes pairs that are less likely than a new person impossible for the associator, in `appearance`,
+/// which has the log-likelihood ratios of the appearances by track and detection, or is empty. Where such
+/// a pair is removed afterwards alone, another track has already lost its own detection to it.
+pub(crate) fn veto_births(
+    appearance: &mut Vec<Vec<f64>>,
+    tracks: &[Track],
+    detections: &[Detection],
+    camera: &Camera,
+    settings: &BirthSettings,
+) {
+    if settings.are_off() {
+        return;
+    }
+    if appearance.is_empty() {
+        *appearance = vec![vec![0.0; detections.len()]; tracks.len()];
+    }
+    for (row, track) in appearance.iter_mut().zip(tracks) {
+        for (log_ratio, detection) in row.iter_mut().zip(detections) {
+            if !is_likelier(track, detection, *log_ratio, camera, settings) {
+                *log_ratio = NEVER;
+            }
+        }
+    }
+}
+
+/// Removes the pairs that are less likely than a new person, and returns their number: an associator may
+/// not go by appearance. `appearance` is that of [`veto_births`].
 pub(crate) fn remove_births(
     answer: &mut Associations,
     tracks: &[Track],
@@ -31,10 +59,21 @@ pub(crate) fn remove_births(
         let Some(detection) = detections.get(pair.detection) else { return true };
         let row = appearance.get(pair.track);
         let log_ratio = row.and_then(|row| row.get(pair.detection)).copied().unwrap_or(0.0);
-        let births = births_per_m2(detection, camera, settings);
-        log_density(track, detection) + settings.appearance * log_ratio >= births.ln()
+        is_likelier(track, detection, log_ratio, camera, settings)
     });
     (before - answer.pairs.len()) as u64
+}
+
+/// Returns true if a detection is rather of the track's person than of a new one.
+fn is_likelier(
+    track: &Track,
+    detection: &Detection,
+    log_ratio: f64,
+    camera: &Camera,
+    settings: &BirthSettings,
+) -> bool {
+    let births = births_per_m2(detection, camera, settings);
+    log_density(track, detection) + settings.appearance * log_ratio >= births.ln()
 }
 
 /// Returns the logarithm of the density of a track's person at the place of a detection on the
@@ -150,6 +189,22 @@ mod tests {
         }
 
         assert_eq!([of(0.0), of(100.0), of(375.0)], [0.05, 0.05, 0.2]);
+    }
+
+    /// The second track would take the detection of the first one if its own could be an older person's.
+    #[test]
+    fn the_associator_is_told_which_pairs_are_rather_new_people() {
+        let tracks = [track(0.0, 0.01), track(1.6, 1.0)];
+        let found = [detection(270.0, 100.0)];
+        let mut appearance = Vec::new();
+        veto_births(&mut appearance, &tracks, &found, &camera(), &SETTINGS);
+        assert_eq!(appearance, [[0.0], [NEVER]]);
+        let mut appearance = vec![vec![-1.0], vec![1.0]];
+        veto_births(&mut appearance, &tracks, &found, &camera(), &SETTINGS);
+        assert_eq!(appearance, [[-1.0], [1.0]], "it looks like the second one");
+        let mut appearance = Vec::new();
+        veto_births(&mut appearance, &tracks, &found, &camera(), &BirthSettings::default());
+        assert!(appearance.is_empty(), "without densities");
     }
 
     #[test]

@@ -9,7 +9,7 @@ use tagalong_core::{
 };
 use tagalong_vision::Describer;
 
-use crate::births::remove_births;
+use crate::births::{remove_births, veto_births};
 use crate::clock::{Clock, Tick};
 use crate::detections::{DetectionSet, PendingDetection};
 use crate::duplicates::DuplicateFinder;
@@ -355,8 +355,10 @@ impl Tracker {
         let found = detections.undecided_detections();
         let births = &self.settings.births;
         let appearance = self.reidentifier.compare(frame, predicted, &found, !births.are_off());
-        let appearance =
+        let mut appearance =
             appearance.map_err(|error| StepError::of_stage("[appearance]", frame, error))?;
+        let camera = &frame.camera;
+        veto_births(&mut appearance, predicted, &found, camera, births);
         let gate = &gate.with_appearance(&appearance);
         let mut answer = self
             .associator
@@ -364,7 +366,6 @@ impl Tracker {
         // The associator is a plugin; pairs outside of the gate must not reach the filter.
         let impossible = remove_impossible(&mut answer, predicted, &found, gate);
         log.funnel.drop_many("association not possible", impossible);
-        let camera = &frame.camera;
         let removed = remove_births(&mut answer, predicted, &found, &appearance, camera, births);
         log.funnel.drop_many("rather a new person", removed);
         detections.take_over(&answer, predicted, &open);

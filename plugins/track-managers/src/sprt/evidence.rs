@@ -126,7 +126,12 @@ impl Evidence {
             _ => {}
         }
         if track.seen {
-            self.add_motion(track, config);
+            // A lost track that takes a thing beside it has not walked there.
+            let is_thing =
+                matches!(observation, Observation::Detected { log_odds } if log_odds <= clutter);
+            if !is_thing {
+                self.add_motion(track, config);
+            }
             self.still_s += if self.moved { 0.0 } else { dt_s };
         }
         let log_odds = self.log_odds(config);

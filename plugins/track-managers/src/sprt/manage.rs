@@ -60,11 +60,13 @@ impl TrackManager for Sprt {
             let by_detector = detector_log_odds < start_log_odds;
             return Initiation::Drop(if by_detector { "score" } else { "verifier" });
         }
-        if !discovered {
-            return Initiation::Drop("no track fits");
-        }
         let at = detection.position.xy();
         let against = self.clutter.against(&at, self.config.clutter_m);
+        // What a search near a lost track finds is mostly that person, or the thing they disappeared
+        // behind: it must be believed at once to be somebody else.
+        if !discovered && detection.score - against < self.config.confirm_log_odds {
+            return Initiation::Drop("no track fits");
+        }
         if detection.score - against < start_log_odds {
             self.clutter.renew(&at, self.config.clutter_m);
             return Initiation::Drop("clutter");

@@ -11,6 +11,10 @@
 //!   bound that only sure looks of verifiers outweigh. A track that has moved further than its
 //!   uncertainty explains gains belief once, and may stand still from then on. One that never moved
 //!   and was not proven ends, and its places are remembered as clutter, in the frame of the world.
+//!   Detections that rather show a thing are no motion.
+//!
+//! A detection near a track that did not take it starts a track of its own only if it would be confirmed
+//! at once.
 
 mod clutter;
 mod config;

@@ -286,6 +286,24 @@ fn a_track_within_its_uncertainty_or_the_bound_has_not_moved() {
     assert_near(score(3.65, 0.02), 9.0);
 }
 
+/// A person is lost beside a blanket, which is found 0.9 m away with log-odds below zero.
+#[test]
+fn what_is_rather_a_thing_is_no_motion() {
+    fn score(there: f64) -> f64 {
+        let mut bench = Bench::new(Config { repeated: 1.0, ..looks_only() }, 3.0, 2.0);
+        bench.look(0.1, 3.3, 2.0);
+        for _ in 0..3 {
+            bench.look(0.1, 3.9, there);
+        }
+        bench.track.score
+    }
+
+    // Two looks of 2.0 and the one there; 3.0 more for motion.
+    assert_near(score(0.5), 2.0 + 2.0 + 0.5 + 3.0);
+    assert_near(score(0.0), 2.0 + 2.0);
+    assert_near(score(-0.5), 2.0 + 2.0 - 0.5);
+}
+
 #[test]
 fn a_track_is_confirmed_at_its_bound() {
     let config = Config { confirm_log_odds: 4.0, repeated: 1.0, ..looks_only() };
@@ -360,6 +378,25 @@ fn candidates_are_dropped_by_the_test_that_speaks_against_them() {
     assert_eq!(offer(0.4, 0.6, true), Initiation::Drop("verifier"));
     assert_eq!(offer(0.6, 0.6, false), Initiation::Drop("no track fits"));
     assert!(matches!(offer(0.5, 0.5, true), Initiation::Start(_)));
+}
+
+/// The search near a lost track found somebody whom no track takes.
+#[test]
+fn a_refused_detection_starts_a_track_that_is_confirmed_at_once() {
+    fn offer_refused(manager: &mut Sprt, log_odds: f64) -> Initiation {
+        let seen = detection(4.0, log_odds);
+        manager.initiate(ID, &Unassociated::new(&seen, log_odds, false))
+    }
+
+    let config = Config { confirm_log_odds: 4.0, ..looks_only() };
+    let mut manager = Sprt::new(config.clone()).unwrap();
+    assert_eq!(offer_refused(&mut manager, 3.9), Initiation::Drop("no track fits"));
+    let started = offer_refused(&mut manager, 4.0);
+    assert!(matches!(started, Initiation::Start(health) if health.confirmed), "{started:?}");
+    // A thing there that showed 1.0 counts 4.0 against it.
+    let mut manager = Bench::clutter(config, 4.0, 1.0).manager;
+    assert_eq!(offer_refused(&mut manager, 7.9), Initiation::Drop("no track fits"));
+    assert!(matches!(offer_refused(&mut manager, 8.0), Initiation::Start(_)));
 }
 
 /// The looks of the thing, 1.0, and 3.0 more.
