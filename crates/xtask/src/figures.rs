@@ -1,7 +1,8 @@
 //! Sources of the tables of slow commands.
 //!
 //! `benches/figures.toml` has, for each part of a page that takes minutes to hours to print, the
-//! files that its command reads and the version of the simulator, with their hashes at that time.
+//! files that its command reads and the version of the simulator, with their hashes at that time;
+//! comments, and tables of configs that the command does not read, are no part of a hash.
 //! `cargo xtask docs --slow NAME` writes them; `cargo xtask docs --stale` lists the tables that are
 //! older than one of them, and `cargo xtask tidy` says how many these are. That is no complaint:
 //! fast parts, which can be printed anew at once, are held against their commands instead.
@@ -27,6 +28,14 @@ const SIMULATOR_NAME: &str = "simulator";
 const NAMED: &[&str] = &["configs", "configs/scenes", "configs/robots", "benches/papers/configs"];
 /// Folder with the models that plugins have built in, named after them.
 const MODELS: &str = "configs/models";
+/// Tables of a config that the commands that begin so do not read: `[suits]` names the logs that a config
+/// is chosen for or warned of, and `[tune]` the settings among which `bench` chooses.
+const UNREAD: &[(&str, &[&str])] = &[
+    ("tagalong-papers reproduce", &["[suits]", "[tune]"]),
+    ("tagalong-papers follow", &["[tune]"]),
+    ("tagalong follow", &["[tune]"]),
+    ("tagalong trials", &["[tune]"]),
+];
 /// Digits of a hash.
 const DIGITS: usize = 16;
 
@@ -132,10 +141,14 @@ impl Files {
             }
             let content = std::fs::read(workspace.root().join(&path))
                 .with_context(|| format!("cannot read {name}"))?;
-            sources.insert(name, hash(&content));
-            if path.extension().is_some_and(|extension| extension == "toml") {
-                open.extend(self.read_by(&path, &String::from_utf8_lossy(&content)));
+            if path.extension().is_none_or(|extension| extension != "toml") {
+                sources.insert(name, hash(&content));
+                continue;
             }
+            let text = String::from_utf8_lossy(&content);
+            open.extend(self.read_by(&path, &text));
+            let read = meaningful_lines(&text, unread_tables(&part.command));
+            sources.insert(name, hash(read.as_bytes()));
         }
         Ok(sources)
     }
@@ -172,6 +185,46 @@ impl Files {
         }
         files
     }
+}
+
+/// Returns the titles of the tables of a config that a command does not read.
+fn unread_tables(command: &str) -> &'static [&'static str] {
+    for (begin, tables) in UNREAD {
+        if command.starts_with(begin) {
+            return tables;
+        }
+    }
+    &[]
+}
+
+/// Returns the lines of a file in TOML that a figure can depend on: without comments and without the
+/// unread tables.
+fn meaningful_lines(text: &str, unread: &[&str]) -> String {
+    let mut lines = Vec::new();
+    let mut is_unread = false;
+    for line in text.lines() {
+        let line = without_comment(line).trim();
+        if line.starts_with('[') {
+            is_unread = unread.contains(&line);
+        }
+        if !line.is_empty() && !is_unread {
+            lines.push(line);
+        }
+    }
+    lines.join("\n")
+}
+
+/// Returns a line up to its comment; a `#` between quotes begins none.
+fn without_comment(line: &str) -> &str {
+    let mut is_quoted = false;
+    for (at, character) in line.char_indices() {
+        match character {
+            '"' => is_quoted = !is_quoted,
+            '#' if !is_quoted => return &line[..at],
+            _ => {}
+        }
+    }
+    line
 }
 
 /// Returns true for a model that is named after a plugin.
@@ -289,6 +342,23 @@ mod tests {
         let page = workspace.read(PAGE).unwrap();
         assert!(page.contains("| walk |\n\n<!-- end -->") && !page.contains("old"), "{page}");
         assert_eq!(crate::docs::stale_tables(&workspace).unwrap(), [""; 0]);
+    }
+
+    /// A config with a comment, a `#` that begins none, and a table that some commands do not read.
+    const COMMENTED: &str =
+        "# a\n\nplugin = \"#1\" # b\n[suits]\nbaseline_m = 0.3\n[filter]\nx = 1\n";
+
+    fn read_by_command(command: &str) -> String {
+        meaningful_lines(COMMENTED, unread_tables(command))
+    }
+
+    #[test]
+    fn comments_and_tables_that_a_command_does_not_read_make_no_table_stale() {
+        let all = "plugin = \"#1\"\n[suits]\nbaseline_m = 0.3\n[filter]\nx = 1";
+        assert_eq!(read_by_command("tagalong bench --configs a"), all);
+        assert_eq!(read_by_command("tagalong follow a.toml"), all);
+        let rest = "plugin = \"#1\"\n[filter]\nx = 1";
+        assert_eq!(read_by_command("tagalong-papers reproduce a"), rest);
     }
 
     #[test]
