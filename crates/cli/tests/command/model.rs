@@ -242,7 +242,7 @@ fn a_network_joined_with_depth_finds_people_close_by() {
     assert!(chosen.contains("tagalong run yolox-nano-depth LOG"), "{chosen}");
     let alone = recall("depth-verified");
     let joined = recall("yolox-nano-depth");
-    assert!(alone < 0.5 && joined > 0.75, "{alone} {joined}");
+    assert!(alone < 0.6 && joined > 0.75, "{alone} {joined}");
 }
 
 #[test]
