@@ -53,7 +53,7 @@ pub(super) struct Job {
     pub(super) source: Source,
 }
 
-/// What is kept of a ride.
+/// The kept parts of a ride.
 pub(super) struct Driven {
     pub(super) setting: &'static str,
     pub(super) planner: &'static str,

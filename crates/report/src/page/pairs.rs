@@ -22,7 +22,7 @@ struct ErrorKind {
     /// Least difference of the means over logs that is named.
     least: f64,
     decimals: usize,
-    /// What the pipeline with more of it does, and how often.
+    /// Words for the pipeline that has more of it, before and after the number.
     words: [&'static str; 2],
 }
 
