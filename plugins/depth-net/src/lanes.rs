@@ -223,12 +223,12 @@ mod tests {
             let camera = camera(turn, at, if is_bent { bent } else { Distortion::None });
             let points = PixelRays::new(&camera).points([column, row], &depth_m);
             let pose = camera.robot_from_camera;
-            for lane in 0..LANES {
+            for (lane, depth_m) in depth_m.into_iter().enumerate() {
                 let ray = camera.ray(Point2::new((column + lane) as f64, row as f64));
                 let turn = pose.rotation.to_rotation_matrix();
-                let point = turn * ray * depth_m[lane] + pose.translation.vector;
+                let point = turn * ray * depth_m + pose.translation.vector;
                 prop_assert_eq!([points.x[lane], points.y[lane], points.z[lane]], [point.x, point.y, point.z]);
-                prop_assert_eq!(points.area_m2[lane], (depth_m[lane] / camera.focal_px()).powi(2));
+                prop_assert_eq!(points.area_m2[lane], (depth_m / camera.focal_px()).powi(2));
             }
             let projector = Projector::new(&camera, [80, 60]);
             prop_assert_eq!(projector.is_none(), is_bent);
