@@ -33,6 +33,7 @@ const LEFT_OUT: &[(&str, &str)] = &[
     ("boxes variants", "needs sequences that a script of Python makes"),
     ("../shared", "needs the annotated logs"),
     ("benches/rooms.toml", "needs the annotated logs"),
+    ("COCO.json", "needs boxes of another program"),
     ("LOG.people.csv", "needs an annotated log"),
     ("old/report.json", "needs a report of last week"),
     ("SLURM_", "needs a cluster"),
