@@ -57,7 +57,7 @@ fn tune_schema() -> Value {
     let nested = json!({ "type": "object" });
     json!({
         "description": "Settings that `tagalong bench --leave-one-room-out` fits, by their \
-            dotted names, each with the values to try. A run takes no notice of them.",
+            dotted names, each with the values to try. A run ignores them.",
         "type": "object",
         "additionalProperties": { "anyOf": [{ "type": "array", "minItems": 1 }, spread, nested] },
     })

@@ -72,6 +72,8 @@ fn resolve<T>(
     let mut written = DeTable::parse(text)?.into_inner();
     let mut rules = Rule::all(written.remove("vary"))?;
     rules.retain(|rule| !is_set(&rule.key));
+    // A seed that was set counts for what is drawn, too.
+    apply(&mut written, set.iter().filter(|change| change.key == "seed"))?;
     let seed = variant.choose(seed_of(&written))?;
     let drawn: Vec<Change> = rules.iter().filter_map(|rule| rule.draw(seed)).collect();
     let mut own = written;
@@ -430,6 +432,14 @@ people.1.speed_mps = { in_turn = [0.5, 0.75, 1.0] }
         assert_eq!((scene.crowd, scene.camera.kind), (5, crate::CameraKind::Stereo));
         assert_eq!(scene.people[0].path, [[1.5, 1.0], [2.0, 2.0]]);
         assert_eq!((scene.people[0].look, scene.people[1].look), (Some(7), Some(7)));
+    }
+
+    #[test]
+    fn a_seed_that_is_set_is_the_seed_of_the_scene() {
+        let set = drawn(&Variant::default().with("seed", 9));
+        assert_eq!(set, drawn(&Variant::of_seed(9)));
+        assert_ne!(set.crowd, drawn(&Variant::of_seed(3)).crowd);
+        assert_eq!(drawn(&Variant::of_seed(3).with("seed", 9)).seed, 3);
     }
 
     #[test]
