@@ -197,6 +197,26 @@ impl ConfigFile {
         Ok(OuterSettings { input, limits, output: pipeline.config().table("output")? })
     }
 
+    /// Returns a note for each list that replaces an inherited one whole: who meant to change one
+    /// setting loses all others.
+    ///
+    /// # Errors
+    /// As for [`ConfigFile::pipeline`].
+    pub fn notes(&self) -> Result<Vec<String>, Failure> {
+        let replaced = self.source.document().and_then(|document| document.replaced_lists());
+        let mut notes = Vec::new();
+        for (list, own, inherited) in replaced.map_err(|error| self.source.mistake(&error))? {
+            notes.push(format!(
+                "{} [[{list}]] of {} {} all {inherited} of the config that it extends; to change one \
+                 setting, write `{list}.0.config.KEY = VALUE`, counted from 0",
+                if own == 1 { "the".to_owned() } else { format!("the {own}") },
+                self.name(),
+                if own == 1 { "replaces" } else { "replace" },
+            ));
+        }
+        Ok(notes)
+    }
+
     /// Reads one top-level table, with places for its mistakes.
     fn table<T: Settings>(&self, name: &str) -> Result<T, BuildError> {
         self.source.table(name)

@@ -445,7 +445,10 @@ fn list<'a>(name: &str, value: Option<Value<'a>>) -> Result<Vec<Value<'a>>, Conf
     match value.into_inner() {
         DeValue::Array(items) => Ok(items.into_iter().collect()),
         _ => {
-            let message = format!("`{name}` is a list: write [[{name}]] with double brackets");
+            let message = format!(
+                "`{name}` is a list: write [[{name}]] with double brackets, or `extends` a config to \
+                 change one entry of its list"
+            );
             Err(ConfigError::new(message).or_at(Some(span)))
         }
     }

@@ -34,6 +34,9 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
         // Told before the log is tried, for a log that does not fit changes nothing about the config.
         let distances = distances.as_ref().map(told).unwrap_or_default();
         print(&format!("{}: valid; {}\n{distances}", config.display(), in_words(&needs, &uses)))?;
+        for note in file.notes()? {
+            print(&format!("  note: {note}\n"))?;
+        }
     }
     let suits = pipeline.config().suits;
     let fit = log.map(|log| fits(pipeline, &outer, log)).transpose()?;

@@ -157,6 +157,7 @@ impl Job {
         let misfits = Traits::of(&source).misfits(&settings.suits);
         let misfit = misfit_note(&config.name(), &[(log_name(args), misfits)]);
         report.notes.extend(misfit.map(|note| format!("{note}; {COMPARE}")));
+        report.notes.extend(config.notes()?);
         let remedies = Remedies::new(registry);
         Ok(Self { pipeline, outer, source, resolved, folder, report, remedies })
     }

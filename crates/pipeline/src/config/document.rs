@@ -3,12 +3,13 @@
 //! The texts are read as one, end to end: a byte range says in which file it lies.
 
 use std::io;
+use std::mem;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use tagalong_config::{ConfigError, FileLimit, model_hint, nearest, read_text};
 use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use toml::de::{DeArray, DeTable, DeValue};
 
 use super::{builtin, tune};
 
@@ -78,6 +79,7 @@ impl Document {
             let table = parse(&base.padded, base.start).map_err(|error| document.locate(error));
             extends = table?.remove(EXTENDS).map(name_of);
         }
+        document.root()?;
         Ok(document)
     }
 
@@ -94,13 +96,34 @@ impl Document {
             // A list of values to try belongs to the file that was written for the trial.
             table.remove(tune::TABLE);
             let mut table = anchor_paths(table, base.folder());
-            inherit(&mut table, inherited);
+            inherit(&mut table, inherited).map_err(|error| self.locate(error))?;
             inherited = table;
         }
         let mut root = parse(&self.text, 0)?;
         root.remove(EXTENDS);
-        inherit(&mut root, inherited);
+        inherit(&mut root, inherited)?;
         Ok(root)
+    }
+
+    /// Returns the lists of tables that a config states anew, with their length and that of the list which
+    /// they replace.
+    ///
+    /// # Errors
+    /// None for a config that was read.
+    pub fn replaced_lists(&self) -> Result<Vec<(String, usize, usize)>, ConfigError> {
+        let Some(base) = self.bases.first() else { return Ok(Vec::new()) };
+        let rest = Self { text: base.text().to_owned(), bases: self.bases[1..].to_vec() };
+        let inherited = rest.root()?;
+        let mut replaced = Vec::new();
+        for (key, own) in &parse(&self.text, 0)? {
+            let before = inherited.get(key).map(Spanned::get_ref);
+            if let (DeValue::Array(own), Some(DeValue::Array(before))) = (own.get_ref(), before)
+                && own.iter().any(|entry| entry.get_ref().is_table())
+            {
+                replaced.push((key.get_ref().to_string(), own.len(), before.len()));
+            }
+        }
+        Ok(replaced)
     }
 
     /// Returns the texts of the configs that are extended, with their paths, the nearest first.
@@ -260,25 +283,56 @@ fn builtin_base(name: &str, error: io::Error) -> io::Result<String> {
     builtin::read_base(Path::new(name)).map_err(|_| error)
 }
 
-/// Adds the keys that a table lacks. Lists are not joined, and the settings of another plugin are
-/// not inherited.
-fn inherit<'a>(table: &mut DeTable<'a>, base: DeTable<'a>) {
+/// Adds the keys that a table lacks. A list replaces the inherited one; a table of its indices
+/// (`detectors.0.config.min_body = 0.3`) changes its entries. The settings of another plugin are not
+/// inherited.
+///
+/// # Errors
+/// An entry that the list does not have.
+fn inherit<'a>(table: &mut DeTable<'a>, base: DeTable<'a>) -> Result<(), ConfigError> {
     for (key, value) in base {
-        match (table.get_mut(&key), value) {
-            (Some(own), value) => inherit_value(own.get_mut(), value.into_inner()),
-            (None, value) => {
+        match table.get_mut(&key) {
+            Some(own) => inherit_value(own.get_mut(), value.into_inner())?,
+            None => {
                 table.insert(key, value);
             }
         }
     }
+    Ok(())
 }
 
-fn inherit_value<'a>(own: &mut DeValue<'a>, base: DeValue<'a>) {
-    if let (DeValue::Table(own), DeValue::Table(base)) = (own, base)
-        && same_plugin(own, &base)
-    {
-        inherit(own, base);
+fn inherit_value<'a>(own: &mut DeValue<'a>, base: DeValue<'a>) -> Result<(), ConfigError> {
+    match (&mut *own, base) {
+        (DeValue::Table(own), DeValue::Table(base)) if same_plugin(own, &base) => {
+            inherit(own, base)
+        }
+        (DeValue::Table(changes), DeValue::Array(items)) => {
+            *own = DeValue::Array(change_entries(items, mem::take(changes))?);
+            Ok(())
+        }
+        _ => Ok(()),
     }
+}
+
+/// Changes entries of a list by their indices.
+fn change_entries<'a>(
+    mut items: DeArray<'a>,
+    changes: DeTable<'a>,
+) -> Result<DeArray<'a>, ConfigError> {
+    let length = items.len();
+    for (index, change) in changes {
+        let at = index.get_ref().parse().ok();
+        let Some(item) = at.and_then(|at: usize| items.get_mut(at)) else {
+            let message = format!(
+                "there is no entry `{}`: the list of the extended config has {length}, from 0",
+                index.get_ref()
+            );
+            return Err(ConfigError::new(message).or_at(Some(index.span())));
+        };
+        let inherited = mem::replace(item, change);
+        inherit_value(item.get_mut(), inherited.into_inner())?;
+    }
+    Ok(items)
 }
 
 fn same_plugin(own: &DeTable<'_>, base: &DeTable<'_>) -> bool {
@@ -337,6 +391,43 @@ mod tests {
         let expected = "[filter]\nplugin = 'a'\nconfig = { x = 1, y = 3 }\n\
                         [clock]\nmax_gap_s = 1.0\n[[detectors]]\nplugin = 'f'\n";
         assert_eq!(table(own, &[("base.toml", base)]).unwrap(), expected.parse().unwrap());
+    }
+
+    #[test]
+    fn an_index_changes_one_entry_of_an_inherited_list() {
+        let base = "[[detectors]]\nplugin = 'd'\nconfig = { x = 1, y = 2 }\n\
+                    [[detectors]]\nplugin = 'e'\nconfig = { z = 3 }\n";
+        let middle = "extends = 'base.toml'\ndetectors.1.config.z = 4\n";
+        let files = [("base.toml", base), ("middle.toml", middle)];
+        let own = "extends = 'middle.toml'\n[detectors.0]\nconfig = { x = 5 }\n";
+        let expected = "[[detectors]]\nplugin = 'd'\nconfig = { x = 5, y = 2 }\n\
+                        [[detectors]]\nplugin = 'e'\nconfig = { z = 4 }\n";
+        assert_eq!(table(own, &files).unwrap(), expected.parse().unwrap());
+        // Another plugin in its place has its own defaults.
+        let own = "extends = 'base.toml'\ndetectors.0.plugin = 'f'\n";
+        let expected = "[[detectors]]\nplugin = 'f'\n\
+                        [[detectors]]\nplugin = 'e'\nconfig = { z = 3 }\n";
+        assert_eq!(table(own, &files).unwrap(), expected.parse().unwrap());
+
+        let error = table("extends = 'base.toml'\n[detectors.2]\nevery = 2\n", &files).unwrap_err();
+        assert!(error.starts_with("own.toml:2:12: there is no entry `2`"), "{error}");
+        let named = table("extends = 'base.toml'\n[detectors.d]\nevery = 2\n", &files).unwrap_err();
+        assert!(named.contains("there is no entry `d`: the list"), "{named}");
+        let odd = [("base.toml", base), ("odd.toml", "extends = 'base.toml'\ndetectors.9 = {}\n")];
+        let there = table("extends = 'odd.toml'\n", &odd).unwrap_err();
+        assert!(there.contains("odd.toml:2:11: there is no entry `9`"), "{there}");
+    }
+
+    #[test]
+    fn lists_that_replace_inherited_ones_are_named() {
+        let base = "x = [1]\n[[detectors]]\nplugin = 'd'\n[[detectors]]\nplugin = 'e'\n";
+        let own = "extends = 'base.toml'\nx = [2]\n[[detectors]]\nplugin = 'f'\n";
+        let folder = folder(&[("base.toml", base)]);
+        let document = Document::read(own, folder.path()).unwrap();
+        assert_eq!(document.replaced_lists().unwrap(), [("detectors".to_owned(), 1, 2)]);
+        let changed = "extends = 'base.toml'\ndetectors.0.every = 2\n";
+        let document = Document::read(changed, folder.path()).unwrap();
+        assert_eq!(document.replaced_lists().unwrap(), []);
     }
 
     #[test]
