@@ -3,6 +3,7 @@ use std::path::Path;
 
 use clap::ValueEnum;
 use tagalong_app::timings::{Timings, WHOLE_FRAME};
+use tagalong_log::Input;
 use tagalong_math::counted;
 
 use super::args::RunArgs;
@@ -13,6 +14,9 @@ const FUNNEL_LINES: usize = 6;
 
 /// Persons that are listed one by one.
 const PERSON_LINES: usize = 12;
+
+/// Inputs that give boxes in an image.
+const IMAGES: [Input; 3] = [Input::Colour, Input::Depth, Input::Right];
 
 /// Stages whose times are shown beside those of whole frames.
 const STAGE_LINES: usize = 3;
@@ -38,7 +42,8 @@ pub fn text(report: &RunReport, timings: &Timings, folder: &Path, args: &RunArgs
     funnel(&mut out, report);
     times(&mut out, timings);
     losses(&mut out, report);
-    files(&mut out, folder, args.overlay.is_some());
+    let has_images = IMAGES.iter().any(|input| report.inputs.usable().contains(&input.name()));
+    files(&mut out, folder, has_images, args.overlay.is_some());
     out
 }
 
@@ -53,15 +58,21 @@ fn persons(out: &mut String, report: &RunReport, args: &RunArgs) {
         // A person whose track ends is reported under a new ID: these are no persons.
         count => writeln!(out, "{}:", counted(count, "ID")),
     };
-    for (id, person) in report.persons.iter().take(PERSON_LINES) {
+    // The longest seen: short-lived IDs say little.
+    let mut longest: Vec<_> = report.persons.iter().collect();
+    longest.sort_by_key(|(_, person)| std::cmp::Reverse(person.seen_frames));
+    let further = longest.split_off(longest.len().min(PERSON_LINES));
+    longest.sort_by_key(|(id, _)| **id);
+    for (id, person) in longest {
         let _ = writeln!(
             out,
             "  {id}: frames {} to {}, seen in {}",
             person.first_frame, person.last_frame, person.seen_frames
         );
     }
-    if report.persons.len() > PERSON_LINES {
-        let _ = writeln!(out, "  and {} more", report.persons.len() - PERSON_LINES);
+    if let Some((_, person)) = further.first() {
+        let frames = counted(person.seen_frames, "frame");
+        let _ = writeln!(out, "  and {} more, seen in at most {frames}", further.len());
     }
 }
 
@@ -115,7 +126,7 @@ fn times(out: &mut String, timings: &Timings) {
     let mut stages: Vec<_> = summary.iter().filter(|(name, _)| **name != WHOLE_FRAME).collect();
     stages.sort_by(|a, b| b.1.max_ms.total_cmp(&a.1.max_ms));
     let _ =
-        writeln!(out, "{:<14}{:>8}{:>8}{:>8}{:>8}", "ms per frame", "p50", "p95", "p99", "worst");
+        writeln!(out, "{:<14}{:>8}{:>8}{:>8}{:>8}", "wall time, ms", "p50", "p95", "p99", "worst");
     for (name, t) in std::iter::once((&WHOLE_FRAME, whole)).chain(stages).take(1 + STAGE_LINES) {
         let [p50, p95, p99] = [t.p50_ms, t.p95_ms, t.p99_ms];
         let _ = writeln!(out, "  {name:<12}{p50:>8.2}{p95:>8.2}{p99:>8.2}{:>8.2}", t.max_ms);
@@ -132,13 +143,22 @@ fn losses(out: &mut String, report: &RunReport) {
     }
 }
 
-fn files(out: &mut String, folder: &Path, overlay: bool) {
+fn files(out: &mut String, folder: &Path, has_images: bool, overlay: bool) {
     let shown = folder.display();
     let _ = writeln!(out, "files in {shown}; to look at them:");
     let _ = writeln!(out, "  tagalong view {}", quoted(&shown.to_string()));
     let mcap = quoted(&folder.join("tracks.mcap").display().to_string());
-    let _ = writeln!(out, "  rerun {mcap}    (people in space, camera; images with --with-images)");
-    let _ = writeln!(out, "  Foxglove opens the same file: people in 3D, boxes in the image");
+    if has_images {
+        let _ =
+            writeln!(out, "  rerun {mcap}    (people in space, camera; images with --with-images)");
+        let _ = writeln!(out, "  Foxglove opens the same file: people in 3D, boxes in the image");
+    } else {
+        let _ = writeln!(out, "  rerun {mcap}, or Foxglove: people in space");
+        let _ = writeln!(
+            out,
+            "  no camera was used: tracks-metres.csv has the people, tracks.csv no box"
+        );
+    }
     if overlay {
         let _ = writeln!(out, "  {shown}/overlay/ has a picture of every frame");
     }
