@@ -36,12 +36,13 @@ impl AppearanceFusion {
     ///
     /// ```
     /// use tagalong_associators::{AppearanceFusion, Fusion};
-    /// let by = |fusion| AppearanceFusion { fusion, gate: 0.5 };
+    /// let smaller = AppearanceFusion { fusion: Fusion::Minimum, gate: 0.5 };
+    /// let sum = AppearanceFusion { fusion: Fusion::Sum, ..smaller };
     /// // Appearances with 0.4 between them: the probability is 1 - 0.4 / 2.
     /// let log_ratio = (0.8_f64 / 0.2).ln();
-    /// assert!((by(Fusion::Minimum).similarity(0.6, log_ratio) - 0.8).abs() < 1e-12);
-    /// assert_eq!(by(Fusion::Minimum).similarity(0.6, -log_ratio), 0.6);
-    /// assert!(by(Fusion::Sum).similarity(0.6, -log_ratio) < 0.3);
+    /// assert!((smaller.similarity(0.6, log_ratio) - 0.8).abs() < 1e-12);
+    /// assert_eq!(smaller.similarity(0.6, -log_ratio), 0.6);
+    /// assert!(sum.similarity(0.6, -log_ratio) < 0.3);
     /// ```
     pub fn similarity(&self, place: f64, log_ratio: f64) -> f64 {
         match self.fusion {

@@ -93,9 +93,9 @@ impl ObservationMemory {
         let from = first.region.centre();
         let to = last.region.centre();
         let centre = to + (to - from) * ahead;
-        let size = |from: f64, to: f64| (to + (to - from) * ahead).max(1.0);
-        let width = size(first.region.width, last.region.width);
-        let height = size(first.region.height, last.region.height);
+        let [width, height] =
+            [[first.region.width, last.region.width], [first.region.height, last.region.height]]
+                .map(|[from, to]| (to + (to - from) * ahead).max(1.0));
         Some(Rect::new(centre.x - 0.5 * width, centre.y - 0.5 * height, width, height))
     }
 }

@@ -196,22 +196,20 @@ impl Pairs<'_> {
         fit: impl Fn(&Track, &Detection) -> Option<Fit>,
     ) -> Vec<Vec<Option<Fit>>> {
         let Stage { rows, columns } = stage;
-        let pair = |row: usize, column: usize| {
-            let track = &self.tracks[row];
-            let detection = &self.detections[column];
-            let fit = self.gate.admits(track, detection).then(|| fit(track, detection)).flatten();
-            let look = self.gate.appearance_of(row, column);
-            fit.map(|fit| pair_cost.with_appearance(fit, look))
-        };
         // Most pairs are too far apart along one axis, which is seen soonest in a list of places.
         let reach = 1.01 * pair_cost.reach_m(self.gate.dt_s);
         let places: Vec<_> = columns.iter().map(|i| self.detections[*i].position.xy()).collect();
         rows.iter()
             .map(|row| {
-                let own = self.tracks[*row].estimate.person.position.xy();
+                let track = &self.tracks[*row];
+                let own = track.estimate.person.position.xy();
                 let each = columns.iter().zip(&places).map(|(column, place)| {
-                    let is_far = (place - own).amax() > reach;
-                    if is_far { None } else { pair(*row, *column) }
+                    let detection = &self.detections[*column];
+                    if (place - own).amax() > reach || !self.gate.admits(track, detection) {
+                        return None;
+                    }
+                    let look = self.gate.appearance_of(*row, *column);
+                    fit(track, detection).map(|fit| pair_cost.with_appearance(fit, look))
                 });
                 each.collect()
             })
@@ -244,9 +242,9 @@ pub fn assign_fits(
     at_gate: f64,
     miss_factor: f64,
 ) -> Vec<Option<usize>> {
-    let volumes = || fits.iter().flatten().flatten().map(|f| f.log_volume);
-    let least = volumes().fold(f64::INFINITY, f64::min);
-    let most = volumes().fold(f64::NEG_INFINITY, f64::max);
+    let volumes: Vec<f64> = fits.iter().flatten().flatten().map(|f| f.log_volume).collect();
+    let least = volumes.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = volumes.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     // With the range of ln |S| added, no pair within the gate costs more than a miss at factor 1.
     let range = if most > least { most - least } else { 0.0 };
     let miss = miss_factor * at_gate + range;
@@ -296,33 +294,33 @@ mod tests {
     #[test]
     fn the_smaller_cost_counts_in_the_unit_of_the_cost() {
         let fit = Fit { cost: 3.0, log_volume: -1.0 };
-        let with = |cost: Cost, gate: f64, log_ratio: f64| {
-            let fusion = AppearanceFusion { fusion: Fusion::Minimum, gate };
-            PairCost { cost, fusion, ..DEFAULT }.with_appearance(fit, log_ratio).cost
-        };
         let even = 0.5_f64.ln();
-        assert!((with(Cost::Mahalanobis, 0.2, 1e-9) + 2.0 * even).abs() < 1e-6);
-        assert!((with(Cost::Overlap, 0.04, 1e-9) + even).abs() < 1e-6);
-        assert_eq!(with(Cost::Mahalanobis, 0.3, 4.0), 3.0, "too far away");
-        assert_eq!(with(Cost::Overlap, 0.06, 4.0), 3.0, "too far away");
-        assert_eq!(with(Cost::Mahalanobis, 0.0, -4.0), 3.0, "it never speaks against a pair");
-    }
-
-    fn fit(track: &Track, detection: &Detection, dt_s: f64, settings: &PairCost) -> Option<Fit> {
-        settings.fit(track, detection, dt_s)
+        for (cost, gate, log_ratio, expected) in [
+            (Cost::Mahalanobis, 0.2, 1e-9, -2.0 * even),
+            (Cost::Overlap, 0.04, 1e-9, -even),
+            // Too far away.
+            (Cost::Mahalanobis, 0.3, 4.0, 3.0),
+            (Cost::Overlap, 0.06, 4.0, 3.0),
+            // It never speaks against a pair.
+            (Cost::Mahalanobis, 0.0, -4.0, 3.0),
+        ] {
+            let fusion = AppearanceFusion { fusion: Fusion::Minimum, gate };
+            let found = PairCost { cost, fusion, ..DEFAULT }.with_appearance(fit, log_ratio).cost;
+            assert!((found - expected).abs() < 1e-6, "{cost:?} {gate} {log_ratio}: {found}");
+        }
     }
 
     /// Runs the assignment with the cost of a miss in multiples of the cost at the gate.
-    fn associate(
+    fn assigned_pairs(
         tracks: &[Track],
         detections: &[Detection],
-        fit: impl Fn(&Track, &Detection) -> Option<Fit>,
-        (settings, miss_factor): (&PairCost, f64),
+        settings: &PairCost,
+        miss_factor: f64,
     ) -> Vec<Option<usize>> {
-        let fits: Vec<Vec<Option<Fit>>> = tracks
-            .iter()
-            .map(|track| detections.iter().map(|detection| fit(track, detection)).collect())
-            .collect();
+        let mut fits = Vec::new();
+        for track in tracks {
+            fits.push(detections.iter().map(|found| settings.fit(track, found, 0.1)).collect());
+        }
         assign_fits(&fits, detections.len(), settings.at_gate(), miss_factor)
     }
 
@@ -343,7 +341,7 @@ mod tests {
             let detection = detection_at(3.0, 0.0).with_covariance(covariance);
             let prior = SMatrix::<f64, 5, 5>::identity() * 0.04;
             let track = track(detection.position - nalgebra::Vector3::from(off), prior);
-            let found = fit(&track, &detection, 0.1, &settings).unwrap();
+            let found = settings.fit(&track, &detection, 0.1).unwrap();
             let s = covariance + Matrix3::identity() * 0.04;
             let nu = nalgebra::Vector3::from(off);
             let expected = (nu.transpose() * s.try_inverse().unwrap() * nu).x;
@@ -354,13 +352,11 @@ mod tests {
 
     #[test]
     fn a_vague_track_does_not_take_the_detection_of_a_certain_one() {
-        let settings = DEFAULT;
         let detection = detection_at(3.0, 0.0);
         let near = detection.position + nalgebra::Vector3::new(0.25, 0.0, 0.0);
         let certain = track(near, SMatrix::identity() * 0.01);
         let vague = track(near, SMatrix::identity() * 1.0);
-        let fit = |t: &Track, d: &Detection| fit(t, d, 0.1, &settings);
-        let given = associate(&[vague, certain], &[detection], fit, (&settings, 1.0));
+        let given = assigned_pairs(&[vague, certain], &[detection], &DEFAULT, 1.0);
         assert_eq!(given, [None, Some(0)]);
     }
 
@@ -376,32 +372,36 @@ mod tests {
     #[test]
     fn nobody_is_found_outside_the_gate_or_farther_than_they_can_have_walked() {
         let settings = PairCost { gate: 4.0, ..DEFAULT };
-        let fits = |off_m: f64, variance: f64, dt_s: f64| {
+        // The gate is one metre, plus 1.5 m for each second.
+        for (off_m, variance, dt_s, fits) in [
+            // Two standard deviations.
+            (0.19, 0.01, 0.1, true),
+            (0.21, 0.01, 0.1, false),
+            (1.14, 1.0, 0.1, true),
+            (1.16, 1.0, 0.1, false),
+            (1.74, 1.0, 0.5, true),
+            (1.76, 1.0, 0.5, false),
+            // A place without any uncertainty can be held against none.
+            (0.0, 0.0, 0.1, false),
+        ] {
             let detection = detection_at(3.0, 0.0).with_covariance(Matrix3::zeros());
             let at = detection.position - nalgebra::Vector3::new(off_m, 0.0, 0.0);
             let track = track(at, SMatrix::identity() * variance);
-            fit(&track, &detection, dt_s, &settings).is_some()
-        };
-        assert!(fits(0.19, 0.01, 0.1) && !fits(0.21, 0.01, 0.1), "two standard deviations");
-        // The gate is one metre, plus 1.5 m for each second.
-        assert!(fits(1.14, 1.0, 0.1) && !fits(1.16, 1.0, 0.1));
-        assert!(fits(1.74, 1.0, 0.5) && !fits(1.76, 1.0, 0.5));
-        assert!(!fits(0.0, 0.0, 0.1), "a place without any uncertainty can be held against none");
+            let found = settings.fit(&track, &detection, dt_s);
+            assert_eq!(found.is_some(), fits, "{off_m} {variance} {dt_s}");
+        }
     }
 
     /// The two people are far apart; one track was missed for long and has a large covariance.
     #[test]
     fn a_vague_track_takes_its_own_detection_as_well_as_a_certain_one_does() {
-        let settings = DEFAULT;
         let detections = [detection_at(3.0, 0.0), detection_at(5.0, 2.0)];
         let certain = track(detections[0].position, SMatrix::identity() * 1e-4);
         let off = detections[1].position + nalgebra::Vector3::new(0.9, 0.0, 0.0);
         let vague = track(off, SMatrix::identity() * 0.5);
-        let fit = |t: &Track, d: &Detection| fit(t, d, 0.1, &settings);
-        let given = associate(&[certain, vague.clone()], &detections, fit, (&settings, 1.0));
+        let given = assigned_pairs(&[certain, vague.clone()], &detections, &DEFAULT, 1.0);
         assert_eq!(given, [Some(0), Some(1)]);
-        let alone = associate(&[vague], &detections[1..], fit, (&settings, 1.0));
-        assert_eq!(alone, [Some(0)]);
+        assert_eq!(assigned_pairs(&[vague], &detections[1..], &DEFAULT, 1.0), [Some(0)]);
     }
 
     /// The cost of a miss decides if a poor pair is better than none.
@@ -410,18 +410,12 @@ mod tests {
         let detection = detection_at(3.0, 0.0);
         let off = detection.position + nalgebra::Vector3::new(0.42, 0.0, 0.0);
         let track = track(off, SMatrix::identity() * 0.01);
-        let given = |miss_factor: f64| {
-            let settings = DEFAULT;
-            let fit = |t: &Track, d: &Detection| fit(t, d, 0.1, &settings);
-            associate(
-                std::slice::from_ref(&track),
-                std::slice::from_ref(&detection),
-                fit,
-                (&settings, miss_factor),
-            )
-        };
         // The squared distance is 0.42² / 0.02 = 8.8, the gate 11.34.
-        assert_eq!((given(1.0), given(0.5)), (vec![Some(0)], vec![None]));
+        for (miss_factor, expected) in [(1.0, Some(0)), (0.5, None)] {
+            let tracks = std::slice::from_ref(&track);
+            let seen = std::slice::from_ref(&detection);
+            assert_eq!(assigned_pairs(tracks, seen, &DEFAULT, miss_factor), [expected]);
+        }
     }
 
     #[test]
@@ -429,27 +423,21 @@ mod tests {
         let settings = PairCost { cost: Cost::Overlap, ..DEFAULT };
         let mut track = track(Point3::new(3.0, 0.0, 1.5), SMatrix::identity());
         track.estimate.region = Rect::new(0.0, 0.0, 10.0, 10.0);
-        let cost = |x: f64| {
-            let region = Rect::new(x, 0.0, 10.0, 10.0);
-            fit(
-                &track,
-                &detection_at(9.0, 9.0).with_image(ImageBox::upper_body(region)),
-                0.1,
-                &settings,
-            )
-            .map(|f| f.cost)
-        };
-        assert_eq!(cost(0.0), Some(0.0));
-        assert!((cost(5.0).unwrap() - 3.0_f64.ln()).abs() < 1e-12, "a third");
-        assert_eq!(cost(5.5), None, "less than 0.3");
-        let fit = |t: &Track, d: &Detection| fit(t, d, 0.1, &settings);
-        let detection = detection_at(3.0, 0.0)
-            .with_image(ImageBox::upper_body(Rect::new(5.0, 0.0, 10.0, 10.0)));
-        let given = |miss_factor: f64| {
+        // The last one has less than 0.3.
+        let [_, detection, _] =
+            [(0.0, Some(0.0)), (5.0, Some(3.0_f64.ln())), (5.5, None)].map(|(x, expected)| {
+                let region = Rect::new(x, 0.0, 10.0, 10.0);
+                let detection = detection_at(9.0, 9.0).with_image(ImageBox::upper_body(region));
+                let cost = settings.fit(&track, &detection, 0.1).map(|fit| fit.cost);
+                assert_eq!(cost.is_some(), expected.is_some(), "{x}");
+                let off = cost.unwrap_or_default() - expected.unwrap_or_default();
+                assert!(off.abs() < 1e-12, "{x}: {cost:?}");
+                detection
+            });
+        for (miss_factor, expected) in [(1.0, Some(0)), (0.9, None)] {
             let tracks = std::slice::from_ref(&track);
             let seen = std::slice::from_ref(&detection);
-            associate(tracks, seen, fit, (&settings, miss_factor))
-        };
-        assert_eq!((given(1.0), given(0.9)), (vec![Some(0)], vec![None]));
+            assert_eq!(assigned_pairs(tracks, seen, &settings, miss_factor), [expected]);
+        }
     }
 }

@@ -58,13 +58,15 @@ mod tests {
     #[test]
     fn a_file_of_another_network_is_refused() {
         let good = model().to_text();
-        let refusal = |from: &str, to: &str| {
+        for (from, to, why) in [
+            ("body-net 1", "body-net 9", "body-net 9"),
+            ("third = [", "thirst = [", "no `third`"),
+            ("last = [\n", "last = [ 1.0,\n", "needs 480"),
+        ] {
             assert!(good.contains(from));
-            Model::from_text(&good.replacen(from, to, 1)).unwrap_err()
-        };
-        assert!(refusal("body-net 1", "body-net 9").contains("body-net 9"));
-        assert!(refusal("third = [", "thirst = [").contains("no `third`"));
-        assert!(refusal("last = [\n", "last = [ 1.0,\n").contains("needs 480"));
+            let refusal = Model::from_text(&good.replacen(from, to, 1)).unwrap_err();
+            assert!(refusal.contains(why), "{refusal}");
+        }
     }
 
     #[test]

@@ -41,18 +41,19 @@ pub struct Pass {
 
 impl Default for Pass {
     fn default() -> Self {
-        let [rows, columns] = NetworkInput::GREY;
-        let size = |halved: u32| (rows.div_ceil(1 << halved), columns.div_ceil(1 << halved));
-        fn map<const CHANNELS: usize>((rows, columns): (usize, usize)) -> Map<CHANNELS> {
-            Map::new(rows, columns)
+        /// Creates the map of an input that was halved so many times.
+        fn halved_map<const CHANNELS: usize>(times: u32) -> Map<CHANNELS> {
+            let [rows, columns] = NetworkInput::GREY;
+            Map::new(rows.div_ceil(1 << times), columns.div_ceil(1 << times))
         }
+
         Self {
-            grey: map(size(0)),
-            first: map(size(1)),
-            joined: map(size(1)),
-            second: map(size(2)),
-            third: map(size(3)),
-            fourth: map(size(4)),
+            grey: halved_map(0),
+            first: halved_map(1),
+            joined: halved_map(1),
+            second: halved_map(2),
+            third: halved_map(3),
+            fourth: halved_map(4),
         }
     }
 }

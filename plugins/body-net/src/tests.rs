@@ -145,16 +145,16 @@ mod network {
         let mut gradient = Net::default();
         net.look(&view, &mut pass);
         net.learn(&pass, 1.0, &mut gradient);
-        let mut look = |net: &Net| f64::from(net.look(&view, &mut pass));
         for part in 0..Net::PARTS.len() {
             let count = net.parts()[part].len();
             for k in (0..count).step_by(count.div_ceil(7)) {
                 let value = net.parts()[part][k];
                 let step = 1e-4;
-                net.parts_mut()[part][k] = value + step;
-                let more = look(&net);
-                net.parts_mut()[part][k] = value - step;
-                let slope = (more - look(&net)) / (2.0 * f64::from(step));
+                let [more, less] = [value + step, value - step].map(|value| {
+                    net.parts_mut()[part][k] = value;
+                    f64::from(net.look(&view, &mut pass))
+                });
+                let slope = (more - less) / (2.0 * f64::from(step));
                 net.parts_mut()[part][k] = value;
                 let found = f64::from(gradient.parts()[part][k]);
                 let off = (slope - found).abs();
@@ -206,15 +206,18 @@ mod training {
             let log_odds = model.log_odds(&view, &mut pass);
             assert!((log_odds > 0.0) == (seed % 2 == 0), "{seed}: {log_odds}");
         }
-        let figure = |name: &str| fitted.figures[name].as_float().unwrap();
-        assert!((0.9..=1.0).contains(&figure("area_under_roc")), "{:?}", fitted.figures);
-        assert!(figure("people_accepted") > 0.8 && figure("others_accepted") < 0.2);
+        for (name, range) in [
+            ("area_under_roc", 0.9..=1.0),
+            ("people_accepted", 0.8..=1.0),
+            ("others_accepted", 0.0..=0.2),
+        ] {
+            let figure = fitted.figures[name].as_float().unwrap();
+            assert!(range.contains(&figure), "{name}: {figure}");
+        }
         assert!((0.05..50.0).contains(&model.slope), "{}", model.slope);
-        let count = |name: &str| fitted.figures[name].as_integer();
-        assert_eq!(
-            [count("people"), count("others"), count("without_depth")].map(Option::unwrap),
-            [30, 30, 1]
-        );
+        for (name, expected) in [("people", 30), ("others", 30), ("without_depth", 1)] {
+            assert_eq!(fitted.figures[name].as_integer(), Some(expected), "{name}");
+        }
     }
 
     #[test]

@@ -102,8 +102,8 @@ impl Appearance {
         self.other.update(other, memory as f32);
         let floor = min_sigma as f32;
         for (index, term) in self.terms.iter_mut().enumerate() {
-            let of = |n: &Normals| (n.mean[index], n.sigma[index].max(floor));
-            let ((m1, s1), (m0, s0)) = (of(&self.person), of(&self.other));
+            let [(m1, s1), (m0, s0)] = [&self.person, &self.other]
+                .map(|normals| (normals.mean[index], normals.sigma[index].max(floor)));
             *term = Term {
                 constant: (s0 / s1).ln(),
                 mean: [m0, m1],

@@ -21,9 +21,8 @@ impl Pixels {
 pub(crate) fn disc(radius: f64, step: i64) -> impl Iterator<Item = (i64, i64)> {
     let step = step.max(1);
     let reach = (radius.max(0.0) as i64 / step).min(200);
-    let places = move |i: i64| (-reach..=reach).map(move |j| (j * step, i * step));
     (-reach..=reach)
-        .flat_map(places)
+        .flat_map(move |i| (-reach..=reach).map(move |j| (j * step, i * step)))
         .filter(move |(x, y)| ((x * x + y * y) as f64) <= radius * radius)
 }
 
@@ -46,10 +45,9 @@ mod tests {
     fn a_disc_is_every_place_within_the_radius_on_its_grid() {
         for (radius, step) in [(2.0, 1), (5.0, 2), (7.3, 3), (0.5, 1), (3.0, 0), (-1.0, 1)] {
             let apart = step.max(1);
-            let is_on_grid = |v: &i64| v % apart == 0;
             let mut expected = Vec::new();
-            for y in (-20..=20_i64).filter(is_on_grid) {
-                for x in (-20..=20_i64).filter(is_on_grid) {
+            for y in (-20..=20_i64).filter(|y| y % apart == 0) {
+                for x in (-20..=20_i64).filter(|x| x % apart == 0) {
                     if ((x * x + y * y) as f64) <= f64::max(radius, 0.0).powi(2) {
                         expected.push((x, y));
                     }

@@ -180,20 +180,21 @@ fn sample(
     let Scratch { numbers, person, other, .. } = scratch;
     let width = of.width as f64;
     let radius = (config.positive_radius * width).max(2.0);
-    let near = disc(radius, (radius / 4.0).round() as i64);
-    let away = ring(config.negative_from * width, config.negative_to * width, config.negatives);
+    let mut near = disc(radius, (radius / 4.0).round() as i64);
+    let mut away = ring(config.negative_from * width, config.negative_to * width, config.negatives);
     person.clear(numbers.len());
     other.clear(numbers.len());
-    let mut add = |samples: &mut Samples, (dx, dy): (i64, i64)| {
-        let x = of.x + dx;
-        let y = of.y + dy;
-        if target.scaled.fits(&view.integral, x, y) {
-            target.scaled.measure(&view.integral, x as usize, y as usize, numbers);
-            samples.add(numbers);
+    let near: &mut dyn Iterator<Item = (i64, i64)> = &mut near;
+    for (samples, offsets) in [(&mut *person, near), (&mut *other, &mut away)] {
+        for (dx, dy) in offsets {
+            let x = of.x + dx;
+            let y = of.y + dy;
+            if target.scaled.fits(&view.integral, x, y) {
+                target.scaled.measure(&view.integral, x as usize, y as usize, numbers);
+                samples.add(numbers);
+            }
         }
-    };
-    near.for_each(|offset| add(person, offset));
-    away.for_each(|offset| add(other, offset));
+    }
     person.len() >= 4 && other.len() >= 4
 }
 
@@ -275,14 +276,15 @@ impl Hunt<'_> {
     /// The best box around the expected one: coarsely, then finely.
     fn search(&mut self, expected: &Rect, dropped: &mut Dropped) -> Option<Scored> {
         let (width, height) = self.target.scaled.size();
-        let px = |widths: f64| widths * width as f64;
+        let width_px = width as f64;
         let centre = expected.centre();
-        let x = (centre.x - 0.5 * width as f64).round() as i64;
+        let x = (centre.x - 0.5 * width_px).round() as i64;
         let y = (centre.y - 0.5 * height as f64).round() as i64;
         self.scratch.coarse.clear();
         let full = self.config.full_search;
-        let step = if full { 1 } else { (px(self.config.coarse_step).round() as i64).max(1) };
-        for (dx, dy) in disc(px(self.config.search_radius), step) {
+        let coarse_px = self.config.coarse_step * width_px;
+        let step = if full { 1 } else { (coarse_px.round() as i64).max(1) };
+        for (dx, dy) in disc(self.config.search_radius * width_px, step) {
             if let Some(scored) = self.look(x + dx, y + dy, Some(&mut *dropped)) {
                 self.scratch.coarse.push(scored);
             }
@@ -291,9 +293,10 @@ impl Hunt<'_> {
         if full {
             return Some(coarse);
         }
-        let fine_step = (px(self.config.fine_radius) / 5.0).round() as i64;
+        let fine_px = self.config.fine_radius * width_px;
+        let fine_step = (fine_px / 5.0).round() as i64;
         let mut finest = coarse;
-        for (dx, dy) in disc(px(self.config.fine_radius), fine_step) {
+        for (dx, dy) in disc(fine_px, fine_step) {
             if let Some(scored) = self.look(coarse.x + dx, coarse.y + dy, None)
                 && scored.confidence > finest.confidence
             {
@@ -382,18 +385,17 @@ fn sighting(
         Some(face_m) => (face_m + HEAD_RADIUS_M, config.sigma_depth_m),
         None => (camera.depth_of(&expected), SIGMA_EXPECTED * camera.depth_of(&expected)),
     };
-    let place = |head_m: f64| -> Option<PointEstimate> {
-        let before = track.estimate.region;
-        let shift = region.centre() - before.centre();
-        let pixel = camera.project(&expected)?;
-        let grown = region.width / before.width.max(1.0);
-        let pixel = before.centre() + shift + (pixel - before.centre()) * grown;
-        let sigma_px = config.sigma_box * region.width;
-        Some(camera.locate(pixel, head_m, sigma_px, sigma_m))
+    let PointEstimate { position, covariance } = match camera.project(&expected) {
+        Some(pixel) => {
+            let before = track.estimate.region;
+            let shift = region.centre() - before.centre();
+            let grown = region.width / before.width.max(1.0);
+            let pixel = before.centre() + shift + (pixel - before.centre()) * grown;
+            camera.locate(pixel, head_m, config.sigma_box * region.width, sigma_m)
+        }
+        // A person behind the camera has no pixel: the answer is as good as none.
+        None => PointEstimate { position: expected, covariance: Matrix3::identity() * 100.0 },
     };
-    // A person behind the camera has no pixel: the answer is as good as none.
-    let unknown = PointEstimate { position: expected, covariance: Matrix3::identity() * 100.0 };
-    let PointEstimate { position, covariance } = place(head_m).unwrap_or(unknown);
     Detection::new(NAME, position, covariance, config.score)
         .with_image(ImageBox::upper_body(region))
 }
@@ -525,8 +527,9 @@ mod tests {
             2.0 * before.height,
         );
         let grown = sighting(&config, &camera, &track, twice, Some(face_m));
-        let up = |pixel: nalgebra::Point2<f64>| before.centre().y - pixel.y;
-        let ratio = up(camera.project(&grown.position).unwrap()) / up(from);
+        let grown = camera.project(&grown.position).unwrap();
+        let [above, above_before] = [grown, from].map(|pixel| before.centre().y - pixel.y);
+        let ratio = above / above_before;
         assert!((ratio - 2.0).abs() < 1e-6, "{ratio}");
         let guessed = sighting(&config, &camera, &track, before, None);
         assert!((guessed.position - expected).norm() < 1e-9);
@@ -540,11 +543,14 @@ mod tests {
 
     #[test]
     fn a_search_without_boxes_says_why() {
-        let reason = |nearer, farther, outside| Dropped { outside, nearer, farther }.reason();
-        assert_eq!(reason(3, 2, 6), "appearance: outside the image");
-        assert_eq!(reason(3, 2, 5), "appearance: hidden by something nearer");
-        assert_eq!(reason(2, 3, 5), "appearance: gone, something farther is seen");
-        assert_eq!(reason(2, 2, 0), "appearance: gone, something farther is seen");
+        for (nearer, farther, outside, reason) in [
+            (3, 2, 6, "appearance: outside the image"),
+            (3, 2, 5, "appearance: hidden by something nearer"),
+            (2, 3, 5, "appearance: gone, something farther is seen"),
+            (2, 2, 0, "appearance: gone, something farther is seen"),
+        ] {
+            assert_eq!(Dropped { outside, nearer, farther }.reason(), reason);
+        }
         let mut funnel = Funnel::default();
         Dropped { outside: 5, nearer: 3, farther: 1 }.count(&mut funnel);
         assert_eq!((funnel.count("box: outside"), funnel.count("box: depth")), (5, 4));
@@ -561,24 +567,9 @@ mod tests {
         let view = FrameImages::of(&frame).unwrap();
         let mut target = Target::new(10);
         target.fit_to(&features, &view, &Rect::new(100.0, 80.0, 40.0, 50.0)).unwrap();
-        let lead = |others: &[(i64, i64, f32)]| {
-            let coarse = others
-                .iter()
-                .map(|(x, y, confidence)| Scored { x: *x, y: *y, confidence: *confidence })
-                .collect();
-            let mut scratch = Scratch { coarse, ..Scratch::default() };
-            let hunt = Hunt {
-                config: &config,
-                view: &view,
-                target: &target,
-                scratch: &mut scratch,
-                expected_m: None,
-            };
-            hunt.lead(Scored { x: 100, y: 80, confidence: 5.0 })
-        };
         let none = f32::INFINITY;
         // Half a width is 20 pixels, along the columns, along the rows, and across both.
-        for (x, y, expected) in [
+        let mut cases = [
             (120, 80, 1.0),
             (119, 80, none),
             (80, 80, 1.0),
@@ -589,10 +580,24 @@ mod tests {
             (112, 96, 1.0),
             (112, 95, none),
             (88, 64, 1.0),
-        ] {
-            assert_eq!(lead(&[(x, y, 4.0)]), expected, "{x}, {y}");
+        ]
+        .map(|(x, y, expected)| (vec![(x, y, 4.0)], expected))
+        .to_vec();
+        // Over the best of those elsewhere.
+        cases.push((vec![(105, 80, 4.9), (140, 80, 2.0), (60, 80, 3.5), (100, 40, 3.0)], 1.5));
+        for (others, expected) in cases {
+            let coarse =
+                others.iter().map(|&(x, y, confidence)| Scored { x, y, confidence }).collect();
+            let mut scratch = Scratch { coarse, ..Scratch::default() };
+            let hunt = Hunt {
+                config: &config,
+                view: &view,
+                target: &target,
+                scratch: &mut scratch,
+                expected_m: None,
+            };
+            let lead = hunt.lead(Scored { x: 100, y: 80, confidence: 5.0 });
+            assert_eq!(lead, expected, "{others:?}");
         }
-        let several = [(105, 80, 4.9), (140, 80, 2.0), (60, 80, 3.5), (100, 40, 3.0)];
-        assert_eq!(lead(&several), 1.5, "over the best of those elsewhere");
     }
 }

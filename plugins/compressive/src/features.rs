@@ -29,12 +29,13 @@ impl Features {
     /// the root of their number, so that all lists vary alike.
     pub fn draw(count: usize, most: usize, seed: u64) -> Self {
         let mut random = ChaCha::new(seed, 0);
-        let list = |random: &mut ChaCha| {
-            let rectangles = 2 + below(random, most.max(2) - 1);
+        let mut lists = Vec::with_capacity(count);
+        for _ in 0..count {
+            let rectangles = 2 + below(&mut random, most.max(2) - 1);
             let weight = 1.0 / (rectangles as f64).sqrt();
-            (0..rectangles).map(|_| rectangle(random, weight)).collect()
-        };
-        Self((0..count).map(|_| list(&mut random)).collect())
+            lists.push((0..rectangles).map(|_| rectangle(&mut random, weight)).collect());
+        }
+        Self(lists)
     }
 
     /// Returns the number of features of a box.
@@ -59,9 +60,9 @@ impl Features {
         for list in &self.0 {
             for rectangle in list {
                 let [left, top, right, bottom] = rectangle.pixels(width, height);
-                let at = |x: usize, y: usize| y * stride + x;
                 scaled.corners.push(Corners {
-                    at: [at(left, top), at(right, top), at(left, bottom), at(right, bottom)],
+                    at: [[left, top], [right, top], [left, bottom], [right, bottom]]
+                        .map(|[x, y]| y * stride + x),
                     weight: (rectangle.weight / ((right - left) * (bottom - top)) as f64) as f32,
                 });
             }

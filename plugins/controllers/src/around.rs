@@ -193,29 +193,31 @@ mod tests {
     /// A camera 1 m above the floor that sees a board 1 m ahead, to the left.
     #[test]
     fn what_is_looked_at_replaces_what_was_remembered_there() {
-        fn all(_: &Point2<f64>) -> bool {
-            true
+        fn board_up_to(column: usize) -> DepthImage {
+            DepthImage::from_fn(40, 30, |x, _| if x < column { 1.0 } else { 3.0 })
         }
 
         use tagalong_geometry::{Distortion, Pinhole};
         let lens = Pinhole { fx: 30.0, fy: 30.0, cx: 19.5, cy: 14.5, distortion: Distortion::None };
         let camera = Camera::mounted(lens, 40, 30, 1.0, 0.0, 0.0);
-        let board =
-            |to: usize| DepthImage::from_fn(40, 30, move |x, _| if x < to { 1.0 } else { 3.0 });
         let mut around = NearestObstacles::new();
-        let mut least = |depth: &DepthImage, heights, is_thing: &dyn Fn(&Point2<f64>) -> bool| {
+        let board_m = 1.0_f64.hypot(0.35);
+        let low = [0.1, 1.5];
+        let wall = DepthImage::filled(40, 30, 1.0);
+        for (depth, heights, is_thing, expected_m, what) in [
+            (&board_up_to(10), low, true, board_m, "a board"),
+            (&board_up_to(0), low, true, 3.0, "the board is gone"),
+            (&board_up_to(10), low, true, board_m, "the board is back"),
+            (&DepthImage::filled(40, 30, f32::NAN), low, true, board_m, "nothing is seen"),
+            (&wall, [1.6, 1.9], true, 9.0, "overhead"),
+            (&wall, low, false, 9.0, "people"),
+        ] {
             let mut look = Look::new();
-            look.add_depth(&camera, depth, heights, is_thing);
+            look.add_depth(&camera, depth, heights, |_| is_thing);
             around.add_look(&look);
-            around.places().map(|at| at.coords.norm()).fold(9.0, f64::min)
-        };
-        assert!((least(&board(10), [0.1, 1.5], &all) - 1.0_f64.hypot(0.35)).abs() < 0.1);
-        assert!((least(&board(0), [0.1, 1.5], &all) - 3.0).abs() < 0.1, "the board is gone");
-        let unknown = DepthImage::filled(40, 30, f32::NAN);
-        assert!((least(&board(10), [0.1, 1.5], &all) - 1.0_f64.hypot(0.35)).abs() < 0.1);
-        assert!(least(&unknown, [0.1, 1.5], &all) < 1.2, "nothing is seen, so it is still there");
-        assert_eq!(least(&DepthImage::filled(40, 30, 1.0), [1.6, 1.9], &all), 9.0, "overhead");
-        assert_eq!(least(&DepthImage::filled(40, 30, 1.0), [0.1, 1.5], &|_| false), 9.0, "people");
+            let nearest_m = around.places().map(|at| at.coords.norm()).fold(9.0, f64::min);
+            assert!((nearest_m - expected_m).abs() < 0.1, "{what}: {nearest_m}");
+        }
     }
 
     #[test]

@@ -109,11 +109,12 @@ pub(crate) fn reach(config: &Config, camera: &Camera, track: &Track) -> (i64, i6
     let ray = estimate.person.position.coords - camera.robot_from_camera.translation.vector;
     let across = Vector3::new(-ray.y, ray.x, 0.0).try_normalize(1e-9).unwrap_or_default();
     let covariance = estimate.covariance.fixed_view::<3, 3>(0, 0);
-    let sigma = |axis: Vector3<f64>| (axis.transpose() * covariance * axis).x.max(0.0).sqrt();
-    let cells = |axis, most_m: f64| {
-        ((config.search_sigmas * sigma(axis)).min(most_m) / CELL_M).ceil() as i64
-    };
-    (cells(across, config.search_aside_m), cells(Vector3::z(), config.search_up_m))
+    let axes = [(across, config.search_aside_m), (Vector3::z(), config.search_up_m)];
+    let [aside, up] = axes.map(|(axis, most_m)| {
+        let sigma = (axis.transpose() * covariance * axis).x.max(0.0).sqrt();
+        ((config.search_sigmas * sigma).min(most_m) / CELL_M).ceil() as i64
+    });
+    (aside, up)
 }
 
 /// Lays a picture everywhere.
@@ -128,16 +129,22 @@ fn place(strip: &Strip, picture: &Picture, (aside, down): (i64, i64), fits: &mut
     }
 }
 
+/// Returns the places where enough of the picture is shown.
+fn shown_places(config: &Config, fits: &[Placed]) -> impl Iterator<Item = Placed> {
+    fits.iter().copied().filter(|at| at.fit.shown >= config.min_shown)
+}
+
 /// The best place, or the test that it failed.
 pub(crate) fn choose(config: &Config, fits: &[Placed]) -> TestResult<Placed> {
-    let shown = || fits.iter().copied().filter(|at| at.fit.shown >= config.min_shown);
     fn by_correlation(a: &Placed, b: &Placed) -> std::cmp::Ordering {
         a.fit.correlation.total_cmp(&b.fit.correlation)
     }
-    let best = shown().max_by(by_correlation).ok_or("correlation: hidden")?;
-    let off_m =
-        |at: &Placed| CELL_M * ((at.aside - best.aside) as f64).hypot((at.down - best.down) as f64);
-    let elsewhere = shown().filter(|at| off_m(at) >= config.elsewhere_m).max_by(by_correlation);
+    let best = shown_places(config, fits).max_by(by_correlation).ok_or("correlation: hidden")?;
+    let elsewhere = shown_places(config, fits).filter(|at| {
+        let cells = ((at.aside - best.aside) as f64).hypot((at.down - best.down) as f64);
+        CELL_M * cells >= config.elsewhere_m
+    });
+    let elsewhere = elsewhere.max_by(by_correlation);
     let lead = elsewhere.map_or(f64::INFINITY, |at| best.fit.correlation - at.fit.correlation);
     match best.fit {
         fit if fit.correlation < config.min_correlation => Err("correlation: too low"),

@@ -109,12 +109,15 @@ pub(crate) fn brightness(grey: &GreyImage, at: Point2<f64>) -> Option<f32> {
     let top = y.floor() as i64;
     let across = (x - x.floor()) as f32;
     let down = (y - y.floor()) as f32;
-    let row = |y: i64| {
-        let here = f32::from(grey.get(left, y)?);
-        let next = f32::from(grey.get(left + 1, y)?);
-        Some(here + across * (next - here))
-    };
-    let above = row(top)?;
-    let below = row(top + 1)?;
+    let above = brightness_in_row(grey, [left, top], across)?;
+    let below = brightness_in_row(grey, [left, top + 1], across)?;
     Some(above + down * (below - above) - MIDDLE)
+}
+
+/// Returns the brightness between a pixel and the one to its right.
+#[inline]
+fn brightness_in_row(grey: &GreyImage, [x, y]: [i64; 2], across: f32) -> Option<f32> {
+    let here = f32::from(grey.get(x, y)?);
+    let next = f32::from(grey.get(x + 1, y)?);
+    Some(here + across * (next - here))
 }

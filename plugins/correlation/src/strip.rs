@@ -70,6 +70,12 @@ impl Lattice {
 /// Sums over cells, one of each a column.
 type Lanes = [f32; SIDE];
 
+/// Returns the values of a row of cells from a place on.
+#[inline]
+fn lanes_from(values: &[f32], from: usize) -> Lanes {
+    std::array::from_fn(|i| values[from..from + SIDE][i])
+}
+
 impl Strip {
     /// Reads an image and its depth; memory is used again.
     pub(crate) fn read(
@@ -112,11 +118,9 @@ impl Strip {
         for (line, own) in picture.grey.as_chunks::<SIDE>().0.iter().enumerate() {
             let body: &Lanes = &picture.body.as_chunks::<SIDE>().0[line];
             let from = (row + line) * self.columns + column;
-            let lanes =
-                |values: &[f32]| -> Lanes { std::array::from_fn(|i| values[from..from + SIDE][i]) };
-            let seen = lanes(&self.grey);
-            let shown = lanes(&self.shown);
-            let has = lanes(&self.known);
+            let seen = lanes_from(&self.grey, from);
+            let shown = lanes_from(&self.shown, from);
+            let has = lanes_from(&self.known, from);
             for i in 0..SIDE {
                 let counts = body[i] * shown[i];
                 n[i] += counts;

@@ -7,7 +7,7 @@ use tagalong_core::{
     DepthImage, Detection, Detector, EgoMotion, Estimate, Frame, Funnel, GreyImage, Images, Person,
     Query, Stamp, Track, TrackId,
 };
-use tagalong_geometry::{Camera, Distortion, HEAD_RADIUS_M, Pinhole};
+use tagalong_geometry::{Camera, Distortion, HEAD_RADIUS_M, Pinhole, Rect};
 
 use crate::detect::Placed;
 use crate::picture::{CELLS, Distance, SIDE};
@@ -23,8 +23,16 @@ fn camera() -> Arc<Camera> {
 
 /// A reproducible pattern of blotches.
 fn pattern(u: f64, v: f64, kind: f64) -> f64 {
-    let wave = |a: f64, b: f64| (a * u + b * v + kind).sin();
-    127.0 + 60.0 * wave(9.0, 2.0) + 40.0 * wave(-4.0, 7.0 + kind) + 25.0 * wave(15.0, -11.0)
+    let [first, second, third] =
+        [[9.0, 2.0], [-4.0, 7.0 + kind], [15.0, -11.0]].map(|[a, b]| (a * u + b * v + kind).sin());
+    127.0 + 60.0 * first + 40.0 * second + 25.0 * third
+}
+
+/// Returns the place of a pixel in a box, 0 to 1 along each side, if it lies in it.
+fn part_of_box(region: &Rect, x: usize, y: usize) -> Option<(f64, f64)> {
+    let u = (x as f64 + 0.5 - region.x) / region.width;
+    let v = (y as f64 + 0.5 - region.y) / region.height;
+    ((0.0..1.0).contains(&u) && (0.0..1.0).contains(&v)).then_some((u, v))
 }
 
 /// A person as a patterned square, and a passer-by in front of the camera.
@@ -45,26 +53,25 @@ impl World {
         Self { head, kind: 1.0, passer: None, shadow: 0..0, at_s: 1.0 }
     }
 
+    /// Returns whether somebody who passes covers a column.
+    fn is_passed(&self, x: usize) -> bool {
+        self.passer.is_some_and(|(from, to)| (from..to).contains(&x))
+    }
+
     fn frame(&self) -> Frame {
         let camera = camera();
-        let of = camera.upper_body(&self.head);
+        let region = camera.upper_body(&self.head);
         let face_m = (camera.depth_of(&self.head) - HEAD_RADIUS_M) as f32;
-        let on_person = |x: usize, y: usize| {
-            let u = (x as f64 + 0.5 - of.x) / of.width;
-            let v = (y as f64 + 0.5 - of.y) / of.height;
-            ((0.0..1.0).contains(&u) && (0.0..1.0).contains(&v)).then_some((u, v))
-        };
-        let passes = |x: usize| self.passer.is_some_and(|(from, to)| (from..to).contains(&x));
         let grey = GreyImage::from_fn(SIZE.0, SIZE.1, |x, y| {
-            let value = match on_person(x, y) {
-                _ if passes(x) => pattern(x as f64 / 40.0, y as f64 / 40.0, 8.0),
+            let value = match part_of_box(&region, x, y) {
+                _ if self.is_passed(x) => pattern(x as f64 / 40.0, y as f64 / 40.0, 8.0),
                 Some((u, v)) => pattern(u, v, self.kind),
                 None => pattern(x as f64 / 90.0, y as f64 / 90.0, 4.0),
             };
             value.clamp(0.0, 255.0) as u8
         });
-        let depth = DepthImage::from_fn(SIZE.0, SIZE.1, |x, y| match on_person(x, y) {
-            _ if passes(x) => 0.5,
+        let depth = DepthImage::from_fn(SIZE.0, SIZE.1, |x, y| match part_of_box(&region, x, y) {
+            _ if self.is_passed(x) => 0.5,
             _ if self.shadow.contains(&x) => f32::NAN,
             Some(_) => face_m,
             None => 6.0,
@@ -131,13 +138,12 @@ fn where_depth_shows_the_person_others_are_left_to_find_them() {
 #[test]
 fn who_is_half_hidden_is_found_and_who_is_hidden_is_not() {
     let square = camera().upper_body(&ASIDE);
-    let behind = |part: f64| {
+    let [(half, _), (found, tests)] = [0.5, 1.0].map(|part| {
         let from = (square.x + (1.0 - part) * square.width) as usize;
         look(&World::at(HEAD), &World { passer: Some((from, 260)), ..in_shadow() })
-    };
-    let found = behind(0.5).0.unwrap();
-    assert!((found.position - ASIDE).norm() < 0.03, "{found:?}");
-    let (found, tests) = behind(1.0);
+    });
+    let half = half.unwrap();
+    assert!((half.position - ASIDE).norm() < 0.03, "{half:?}");
     assert!(found.is_none() && tests[0].starts_with("correlation: "), "{found:?} {tests:?}");
 }
 
@@ -189,28 +195,29 @@ fn each_person_is_remembered_as_long_as_the_track_of_that_person() {
 
 /// The definition, in double precision, cell by cell.
 fn slow_fit(strip: [&[f32]; 3], columns: usize, picture: &Picture, at: (usize, usize)) -> Fit {
-    let cell =
-        |values: &[f32], i: usize| f64::from(values[(at.1 + i / SIDE) * columns + at.0 + i % SIDE]);
-    let [grey, shown, known] = strip;
-    let of: Vec<usize> =
-        (0..CELLS).filter(|i| picture.body[*i] > 0.0 && cell(shown, *i) > 0.0).collect();
+    let [grey, shown, known] = strip.map(|values| -> Vec<f64> {
+        (0..CELLS)
+            .map(|i| f64::from(values[(at.1 + i / SIDE) * columns + at.0 + i % SIDE]))
+            .collect()
+    });
+    let of: Vec<usize> = (0..CELLS).filter(|i| picture.body[*i] > 0.0 && shown[*i] > 0.0).collect();
     let n = of.len() as f64;
-    let pairs: Vec<(f64, f64)> =
-        of.iter().map(|i| (f64::from(picture.grey[*i]), cell(grey, *i))).collect();
-    let mean = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / n;
-    let a = mean(|p| p.0);
-    let b = mean(|p| p.1);
-    let sum =
-        |of: &dyn Fn(f64, f64) -> f64| -> f64 { pairs.iter().map(|(x, y)| of(x - a, y - b)).sum() };
-    let aa = sum(&|x, _| x * x);
-    let bb = sum(&|_, y| y * y);
-    let ab = sum(&|x, y| x * y);
+    let a = of.iter().map(|i| f64::from(picture.grey[*i])).sum::<f64>() / n;
+    let b = of.iter().map(|i| grey[*i]).sum::<f64>() / n;
+    let [mut aa, mut bb, mut ab] = [0.0; 3];
+    for i in &of {
+        let x = f64::from(picture.grey[*i]) - a;
+        let y = grey[*i] - b;
+        aa += x * x;
+        bb += y * y;
+        ab += x * y;
+    }
     let has_contrast = n > 0.0 && aa > 4.0 * n && bb > 4.0 * n;
     let body = f64::from(picture.count);
     Fit {
         correlation: if has_contrast { ab / (aa * bb).sqrt() } else { 0.0 },
         shown: n / body,
-        known: of.iter().map(|i| cell(known, *i)).sum::<f64>() / body,
+        known: of.iter().map(|i| known[*i]).sum::<f64>() / body,
     }
 }
 
@@ -234,10 +241,12 @@ proptest! {
         let mut strip = Strip::default();
         strip.read(&grey, &depth, &lattice, &distance);
         prop_assert_eq!(strip.places(), (8, 5));
-        let own = |i: usize| pattern((i % SIDE) as f64 / 6.0, (i / SIDE) as f64 / 9.0, seed) as f32;
         let body: [f32; CELLS] = std::array::from_fn(|i| f32::from(i % holes != 1));
         let count = body.iter().sum();
-        let picture = Picture { grey: std::array::from_fn(|i| own(i) - 100.0), body, count };
+        let grey = std::array::from_fn(|i| {
+            pattern((i % SIDE) as f64 / 6.0, (i / SIDE) as f64 / 9.0, seed) as f32 - 100.0
+        });
+        let picture = Picture { grey, body, count };
         let cells = strip.cells();
         let slow = slow_fit(cells, lattice.columns, &picture, (column, row));
         let fast = strip.fit(&picture, column, row);
@@ -263,10 +272,9 @@ fn without_contrast_there_is_no_correlation() {
         let lattice = Lattice { corner, step: 1.0, columns: SIDE, rows: SIDE };
         let mut strip = Strip::default();
         strip.read(&grey, &depth, &lattice, &Distance { ahead_m: 2.5, tolerance_m: 0.5 });
-        let cell = |i: usize| own * sign(i % SIDE, i / SIDE) as f32;
-        let body = [1.0; CELLS];
-        let count = CELLS as f32;
-        strip.fit(&Picture { grey: std::array::from_fn(cell), body, count }, 0, 0).correlation
+        let grey = std::array::from_fn(|i| own * sign(i % SIDE, i / SIDE) as f32);
+        let picture = Picture { grey, body: [1.0; CELLS], count: CELLS as f32 };
+        strip.fit(&picture, 0, 0).correlation
     }
 
     assert!((correlation(2.5, 3.0) - 1.0).abs() < 1e-3);
@@ -336,16 +344,16 @@ fn people_are_searched_as_far_as_they_can_have_got_but_not_farther() {
 fn aside_is_across_the_ray_of_the_camera() {
     let mut camera = camera().as_ref().clone();
     camera.robot_from_camera.translation.vector.y = -2.5;
-    let reach = |slant: f64| {
+    // Across: three times 0.14 m, in cells of 2.375 cm.
+    for (slant, expected) in [(0.01, 0), (-0.01, 18)] {
         let mut track = track(HEAD, false);
         track.estimate.covariance = SMatrix::zeros();
         for (row, column, value) in [(0, 0, 0.01), (0, 1, slant), (1, 0, slant), (1, 1, 0.01)] {
             track.estimate.covariance[(row, column)] = value;
         }
-        crate::detect::reach(&Config::default(), &camera, &track).0
-    };
-    // Across: three times 0.14 m, in cells of 2.375 cm.
-    assert_eq!((reach(0.01), reach(-0.01)), (0, 18));
+        let (aside, _) = crate::detect::reach(&Config::default(), &camera, &track);
+        assert_eq!(aside, expected, "{slant}");
+    }
 }
 
 #[test]
@@ -404,10 +412,18 @@ fn a_sighting_says_where_by_its_cells_and_how_sure_it_is() {
 fn brightness_is_that_between_four_pixels_and_depth_that_of_the_nearest() {
     use crate::picture::{brightness, nearest};
     let grey = GreyImage::from_pixels(2, 2, vec![128, 138, 148, 178]).unwrap();
-    let at = |x: f64, y: f64| brightness(&grey, Point2::new(x, y));
-    assert_eq!((at(0.5, 0.5), at(0.9, 0.5), at(0.5, 0.75)), (Some(0.0), Some(4.0), Some(5.0)));
-    assert_eq!(at(1.0, 1.0), Some(20.0), "the mean of all");
-    assert_eq!((at(0.4, 0.6), at(0.6, 1.6), at(1.6, 0.6)), (None, None, None));
+    for (x, y, expected) in [
+        (0.5, 0.5, Some(0.0)),
+        (0.9, 0.5, Some(4.0)),
+        (0.5, 0.75, Some(5.0)),
+        // The mean of all.
+        (1.0, 1.0, Some(20.0)),
+        (0.4, 0.6, None),
+        (0.6, 1.6, None),
+        (1.6, 0.6, None),
+    ] {
+        assert_eq!(brightness(&grey, Point2::new(x, y)), expected, "{x} {y}");
+    }
     let grey = GreyImage::from_fn(4, 4, |x, y| (128 + 10 * x + 3 * y) as u8);
     let sloped = brightness(&grey, Point2::new(2.75, 1.75)).unwrap();
     assert!((sloped - (22.5 + 3.75)).abs() < 1e-4, "{sloped}");
@@ -431,7 +447,7 @@ fn depth_says_whether_somebody_else_is_before_or_behind() {
 
 #[test]
 fn the_lattice_goes_on_around_the_square() {
-    let square = tagalong_geometry::Rect::new(100.0, 50.0, 48.0, 48.0);
+    let square = Rect::new(100.0, 50.0, 48.0, 48.0);
     let lattice = Lattice::around(&square, 2, 1);
     assert_eq!((lattice.columns, lattice.rows, lattice.step), (SIDE + 4, SIDE + 2, 2.0));
     let middles: Vec<_> = lattice.middles().collect();

@@ -194,11 +194,12 @@ mod tests {
             })
             .collect();
         let beams = Beams::new(&cloud);
-        let range_m = |x: f64, y: f64, z: f64| beams.range_m(&Point3::new(x, y, z));
-        assert!((range_m(1.3, 1.0, 1.0).unwrap() - 2.0).abs() < 1e-6);
-        assert!((range_m(1.3, -1.4, 1.0).unwrap() - 4.0).abs() < 1e-6);
-        assert_eq!(range_m(0.4, -0.2, 3.0), None, "above the view");
-        assert_eq!(range_m(0.3, -0.2, 0.9), None, "the lidar itself");
+        for (x, y, expected) in [(1.3, 1.0, 2.0), (1.3, -1.4, 4.0)] {
+            let range_m = beams.range_m(&Point3::new(x, y, 1.0)).unwrap();
+            assert!((range_m - expected).abs() < 1e-6, "{range_m}");
+        }
+        assert_eq!(beams.range_m(&Point3::new(0.4, -0.2, 3.0)), None, "above the view");
+        assert_eq!(beams.range_m(&Point3::new(0.3, -0.2, 0.9)), None, "the lidar itself");
     }
 
     /// The cells of 2 degrees above the horizon and of 1 degree to the left of ahead.

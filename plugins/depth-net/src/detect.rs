@@ -56,9 +56,11 @@ impl DepthNet {
     /// Returns the nearest peak within reach of a track.
     fn near<'a>(&self, track: &Track, found: &'a [Peak]) -> Option<&'a Peak> {
         let expected = track.estimate.person.position.xy();
-        let cost = |peak: &Peak| peak.distance_m(&expected.coords.into());
-        let near = found.iter().filter(|peak| cost(peak) < self.config.track_radius_m);
-        near.min_by(|a, b| cost(a).total_cmp(&cost(b)))
+        let near = found
+            .iter()
+            .map(|peak| (peak.distance_m(&expected), peak))
+            .filter(|(distance_m, _)| *distance_m < self.config.track_radius_m);
+        near.min_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, peak)| peak)
     }
 }
 

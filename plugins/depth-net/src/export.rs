@@ -114,28 +114,35 @@ fn sample(model: &Model) -> Vec<NamedTensor> {
             .map(|cell| cell % COARSE_CELLS / 16 != 1)
             .collect(),
     };
-    // A linear congruential generator: the values only have to differ.
-    let mut state = 1_u32;
-    let mut next = || {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (state >> 16) as f32 / 65_536.0
-    };
-    map.fine.values.iter_mut().for_each(|value| *value = next() * next());
-    map.coarse.values.iter_mut().for_each(|value| *value = next().round());
+    let mut state = 1;
+    for value in &mut map.fine.values {
+        *value = next_value(&mut state) * next_value(&mut state);
+    }
+    for value in &mut map.coarse.values {
+        *value = next_value(&mut state).round();
+    }
     named(model, &map)
+}
+
+/// Returns the next value of a linear congruential generator: the values only have to differ.
+fn next_value(state: &mut u32) -> f32 {
+    *state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+    (*state >> 16) as f32 / 65_536.0
 }
 
 /// Returns the inputs of the file for a map, and the outputs that it must have.
 pub(crate) fn named(model: &Model, map: &FloorMap) -> Vec<NamedTensor> {
     let mut pass = Pass::default();
     model.net.look(map, &mut pass);
-    let cells =
-        || (0..COARSE_CELLS * COARSE_CELLS).map(|cell| [cell / COARSE_CELLS, cell % COARSE_CELLS]);
-    let log_odds =
-        cells().map(|[row, column]| model.log_odds(f64::from(pass.logit(row, column))) as f32);
+    let cells: Vec<[usize; 2]> = (0..COARSE_CELLS * COARSE_CELLS)
+        .map(|cell| [cell / COARSE_CELLS, cell % COARSE_CELLS])
+        .collect();
+    let log_odds = cells
+        .iter()
+        .map(|[row, column]| model.log_odds(f64::from(pass.logit(*row, *column))) as f32);
     let head = (0..3).flat_map(|axis| {
         let pass = &pass;
-        cells().map(move |[row, column]| pass.head(row, column)[axis])
+        cells.iter().map(move |[row, column]| pass.head(*row, *column)[axis])
     });
     let in_view = map.in_view.iter().map(|seen| f32::from(*seen));
     vec![

@@ -107,8 +107,9 @@ impl FloorMap {
 
     /// Returns the centre of a coarse cell on the floor, m.
     pub fn centre(row: usize, column: usize) -> Point2<f64> {
-        let at = |first_m: f64, cell: usize| first_m + Self::CELL_M * (cell as f64 + 0.5);
-        Point2::new(at(FIRST_X_M, row), at(FIRST_Y_M, column))
+        let [x, y] = [(FIRST_X_M, row), (FIRST_Y_M, column)]
+            .map(|(first_m, cell)| first_m + Self::CELL_M * (cell as f64 + 0.5));
+        Point2::new(x, y)
     }
 
     /// Returns the map with left and right exchanged.
@@ -277,9 +278,7 @@ pub fn reduced(camera: &Camera, depth: &DepthImage) -> Option<(Camera, DepthImag
     }
     let first = step / 2;
     let by = step as f64;
-    let count = |size: usize| (size - first).div_ceil(step);
-    let width = count(depth.width());
-    let height = count(depth.height());
+    let [width, height] = [depth.width(), depth.height()].map(|size| (size - first).div_ceil(step));
     let mut image = DepthImage::filled(width, height, f32::NAN);
     for (y, row) in image.pixels_mut().chunks_exact_mut(width.max(1)).enumerate() {
         let from = depth.row(first + y * step)[first..].iter().step_by(step);
@@ -293,14 +292,21 @@ pub fn reduced(camera: &Camera, depth: &DepthImage) -> Option<(Camera, DepthImag
 
 /// Returns the cells that are true or at most [`BESIDE`] cells away from one that is.
 fn widened(cells: &[bool]) -> Vec<bool> {
+    // Each pass turns rows into columns.
+    widened_along(&widened_along(cells))
+}
+
+/// Returns, column by column, the cells that are true or have one near in their row.
+fn widened_along(cells: &[bool]) -> Vec<bool> {
     let side = FloorMap::CELLS;
-    let near = |at: usize| at.saturating_sub(BESIDE)..(at + BESIDE + 1).min(side);
-    let spread = |cells: &[bool], get: &dyn Fn(usize, usize) -> usize| -> Vec<bool> {
-        (0..side * side).map(|k| near(k % side).any(|other| cells[get(k / side, other)])).collect()
-    };
-    let along = spread(cells, &|row, column| row * side + column);
-    let across = spread(&along, &|column, row| row * side + column);
-    (0..side * side).map(|k| across[k % side * side + k / side]).collect()
+    let mut widened = vec![false; side * side];
+    for (row, cells) in cells.chunks_exact(side).enumerate() {
+        for column in 0..side {
+            let near = column.saturating_sub(BESIDE)..(column + BESIDE + 1).min(side);
+            widened[column * side + row] = cells[near].contains(&true);
+        }
+    }
+    widened
 }
 
 #[cfg(test)]
@@ -327,23 +333,26 @@ mod tests {
         // Slab 5 is from 1.1 to 1.3 m, before the camera.
         assert!(fine[0][5] > 0.9 && fine[1][5] > 0.9, "{fine:?}");
         assert!((fine[0][10] - 1.1).abs() < 0.06, "half the ceiling of 2.3 m: {}", fine[0][10]);
-        let voxel = |x: f64, k: usize| {
+        for (x, voxel, expected, what) in [
+            (2.05, 2, [1.0, 0.0], "empty"),
+            (3.02, 2, [0.0, 0.0], "a surface"),
+            (4.05, 2, [0.0, 1.0], "hidden"),
+            (0.45, 4, [0.0, 0.0], "above the image"),
+        ] {
             let [row, column] = cell(x, 0.05);
-            [map.coarse.at(row, column)[2 * k], map.coarse.at(row, column)[2 * k + 1]]
-        };
-        assert_eq!(voxel(2.05, 2), [1.0, 0.0], "empty");
-        assert_eq!(voxel(3.02, 2), [0.0, 0.0], "a surface");
-        assert_eq!(voxel(4.05, 2), [0.0, 1.0], "hidden");
-        assert_eq!(voxel(0.45, 4), [0.0, 0.0], "above the image");
+            assert_eq!(map.coarse.at(row, column)[2 * voxel..2 * voxel + 2], expected, "{what}");
+        }
     }
 
     #[test]
     fn cells_beside_the_view_are_not_in_it_but_for_those_near() {
         let map = FloorMap::new(&camera(1.1), &DepthImage::filled(80, 60, f32::NAN));
-        let is_in = |x: f64, y: f64| map.in_view[cell(x, y)[0] * 64 + cell(x, y)[1]];
         // At 3 m the view ends 2 m at each side.
-        assert!(is_in(3.05, 1.95) && is_in(3.05, 2.15) && is_in(3.05, -2.15));
-        assert!(!is_in(3.05, 2.65) && !is_in(3.05, -2.65));
+        for (y, is_in) in [(1.95, true), (2.15, true), (-2.15, true), (2.65, false), (-2.65, false)]
+        {
+            let [row, column] = cell(3.05, y);
+            assert_eq!(map.in_view[row * 64 + column], is_in, "{y}");
+        }
         assert!(map.fine.values.iter().chain(&map.coarse.values).all(|value| *value == 0.0));
     }
 

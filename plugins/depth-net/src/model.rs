@@ -80,8 +80,8 @@ impl Model {
         };
         let answers = frame.derived::<Answers>()?;
         let mut known = answers.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_known = |mark: u64, of: Source| mark == self.mark && of == source;
-        if let Some((.., passes)) = known.iter().find(|(mark, of, _)| is_known(*mark, *of)) {
+        let same = known.iter().find(|(mark, of, _)| *mark == self.mark && *of == source);
+        if let Some((.., passes)) = same {
             return Ok((views, Arc::clone(passes)));
         }
         let passes = views.maps.iter().map(|(_, map)| {
@@ -148,14 +148,16 @@ mod tests {
     #[test]
     fn a_file_of_another_network_is_refused() {
         let good = model().to_text();
-        let refusal = |from: &str, to: &str| {
+        for (from, to, why) in [
+            ("depth-net 1", "depth-net 9", "depth-net 9"),
+            ("slope = 1.5", "slope = -1.5", "above zero"),
+            ("third = [", "thirst = [", "no `third`"),
+            ("last = [\n", "last = [ 1.0,\n", "needs 64"),
+        ] {
             assert!(good.contains(from), "{from}");
-            Model::from_text(&good.replacen(from, to, 1)).unwrap_err()
-        };
-        assert!(refusal("depth-net 1", "depth-net 9").contains("depth-net 9"));
-        assert!(refusal("slope = 1.5", "slope = -1.5").contains("above zero"));
-        assert!(refusal("third = [", "thirst = [").contains("no `third`"));
-        assert!(refusal("last = [\n", "last = [ 1.0,\n").contains("needs 64"));
+            let refusal = Model::from_text(&good.replacen(from, to, 1)).unwrap_err();
+            assert!(refusal.contains(why), "{refusal}");
+        }
     }
 
     #[test]

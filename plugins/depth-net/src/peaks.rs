@@ -72,9 +72,9 @@ fn is_highest(map: &FloorMap, pass: &Pass, [row, column]: [usize; 2]) -> bool {
         at.saturating_sub(REACH)..(at + REACH + 1).min(FloorMap::CELLS)
     }
     let own = pass.logit(row, column);
-    let is_higher =
-        |y: usize, x: usize| map.in_view[y * FloorMap::CELLS + x] && pass.logit(y, x) > own;
-    !near(row).any(|y| near(column).any(|x| is_higher(y, x)))
+    !near(row).any(|y| {
+        near(column).any(|x| map.in_view[y * FloorMap::CELLS + x] && pass.logit(y, x) > own)
+    })
 }
 
 fn peak(pass: &Pass, row: usize, column: usize) -> Peak {

@@ -42,23 +42,12 @@ impl Derived for Readings {
 impl Readings {
     /// Finds the borders of the readings.
     fn new(depth: &DepthImage) -> Self {
-        let is_row = |y: &usize| {
-            let step = depth.width() / MOST_SAMPLES + 1;
-            has_readings(depth.row(*y).iter().step_by(step))
-        };
-        let is_column = |x: &usize| {
-            let step = depth.height() / MOST_SAMPLES + 1;
-            has_readings(depth.pixels().iter().skip(*x).step_by(step * depth.width()))
-        };
-        let top = (0..depth.height()).find(is_row).unwrap_or(depth.height());
-        let left = (0..depth.width()).find(is_column).unwrap_or(depth.width());
-        let right = (left..depth.width()).rfind(is_column).unwrap_or(left);
-        Self(Rect::new(
-            left as f64,
-            top as f64,
-            (right - left) as f64,
-            (depth.height() - top) as f64,
-        ))
+        let width = depth.width();
+        let height = depth.height();
+        let top = (0..height).find(|y| has_row(depth, *y)).unwrap_or(height);
+        let left = (0..width).find(|x| has_column(depth, *x)).unwrap_or(width);
+        let right = (left..width).rfind(|x| has_column(depth, *x)).unwrap_or(left);
+        Self(Rect::new(left as f64, top as f64, (right - left) as f64, (height - top) as f64))
     }
 }
 
@@ -173,6 +162,18 @@ impl<'a> Surface<'a> {
             at.x - half_px >= self.readings.0.x && at.x + half_px <= self.readings.0.right()
         })
     }
+}
+
+/// Returns whether a row of an image has readings.
+fn has_row(depth: &DepthImage, y: usize) -> bool {
+    let step = depth.width() / MOST_SAMPLES + 1;
+    has_readings(depth.row(y).iter().step_by(step))
+}
+
+/// Returns whether a column of an image has readings.
+fn has_column(depth: &DepthImage, x: usize) -> bool {
+    let step = depth.height() / MOST_SAMPLES + 1;
+    has_readings(depth.pixels().iter().skip(x).step_by(step * depth.width()))
 }
 
 /// Returns true if at least a twentieth of the pixels of a row or column has readings; noise alone

@@ -82,10 +82,12 @@ fn people_are_found_from_every_height_and_the_near_one_without_a_head() {
             "{height_m} m: {found:?}"
         );
         for person in &truth {
-            let off = |d: &Detection| (d.position.xy() - person.head_in_robot.xy()).norm();
-            let nearest = found.iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap();
-            assert!(off(nearest) < 0.25, "{height_m} m: {}", off(nearest));
-            let off_m = (nearest.position.z - person.head_in_robot.z).abs();
+            let head = person.head_in_robot;
+            let apart = found.iter().map(|found| (found.position.xy() - head.xy()).norm());
+            let (nearest_m, nearest) =
+                apart.zip(&found).min_by(|(a, _), (b, _)| a.total_cmp(b)).unwrap();
+            assert!(nearest_m < 0.25, "{height_m} m: {nearest_m}");
+            let off_m = (nearest.position.z - head.z).abs();
             assert!(off_m < 0.3, "{height_m} m: height {off_m}");
         }
     }
@@ -153,9 +155,10 @@ fn people_are_found_by_the_points_of_both_kinds_of_lidars_on_all_sides_that_they
         let places: Vec<_> = found.iter().map(|found| found.position).collect();
         assert_eq!(found.len(), truth.len(), "{pattern}: {places:?} for {heads:?}");
         for person in &truth {
-            let off = |d: &Detection| (d.position - person.head_in_robot).norm();
-            let nearest = found.iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap();
-            assert!(off(nearest) < 0.25, "{pattern}: {} m", off(nearest));
+            let apart = found.iter().map(|found| (found.position - person.head_in_robot).norm());
+            let (nearest_m, nearest) =
+                apart.zip(&found).min_by(|(a, _), (b, _)| a.total_cmp(b)).unwrap();
+            assert!(nearest_m < 0.25, "{pattern}: {nearest_m} m");
             assert!(nearest.image.is_none(), "there is no image");
         }
         // A frame without points is an error that names the input.
@@ -186,13 +189,14 @@ fn the_verifier_believes_people_doubts_furniture_and_says_nothing_out_of_sight()
     let (frame, truth) = room(1.2, NEAR_AND_FAR);
     let mut verifier = DepthNetVerifier::new(VerifierConfig::default(), &context()).unwrap();
     let candidate = found(&frame).remove(0);
-    let mut log_odds = |position: Point3<f64>| {
-        verifier.log_odds(&frame, &candidate.clone().with_position(position)).unwrap()
-    };
-    assert!(log_odds(truth[0].head_in_robot) > 1.0);
     let shelf = Point3::new(5.5, -1.0, 1.5);
-    assert!(log_odds(shelf) < -1.0, "{}", log_odds(shelf));
-    assert_eq!(log_odds(Point3::new(-2.0, 0.0, 1.5)), 0.0);
+    let unseen = Point3::new(-2.0, 0.0, 1.5);
+    let [person, shelf, unseen] = [truth[0].head_in_robot, shelf, unseen].map(|position| {
+        verifier.log_odds(&frame, &candidate.clone().with_position(position)).unwrap()
+    });
+    assert!(person > 1.0, "{person}");
+    assert!(shelf < -1.0, "{shelf}");
+    assert_eq!(unseen, 0.0);
 }
 
 #[test]
@@ -200,12 +204,12 @@ fn near_a_confirmed_track_a_lower_score_suffices() {
     let (frame, truth) = room(1.2, NEAR_AND_FAR);
     let config = Config { discover_score: 1e3, track_score: -1e3, ..Config::default() };
     let head = truth[0].head_in_robot;
-    let followed = |confirmed: bool| {
+    for (confirmed, expected) in [(true, 1), (false, 0)] {
         let track = target(head.x, head.y, Vector2::zeros()).with_confirmed(confirmed);
         let query = Query::Track(&track);
-        detector(config.clone()).detect(&frame, &query, &mut Funnel::default()).unwrap().len()
-    };
-    assert_eq!([followed(true), followed(false)], [1, 0]);
+        let found = detector(config.clone()).detect(&frame, &query, &mut Funnel::default());
+        assert_eq!(found.unwrap().len(), expected);
+    }
 }
 
 #[test]
@@ -289,15 +293,12 @@ mod training {
         }
 
         let short = Training { steps: 2, real_steps: 2, batch: 4, ..Training::default() };
-        let fitted = |changed: bool| {
+        let [before, after] = [NEAR_AND_FAR, ""].map(|other| {
             let mut trainer = trainer(short.clone());
-            let other = if changed { "" } else { NEAR_AND_FAR };
             let (frame, truth) = room(1.2, other);
             trainer.add_frame(&frame, &people(&truth), Some("third"), 0).unwrap();
             trainer.fit(&mut |_| {}).unwrap()
-        };
-        let before = fitted(false);
-        let after = fitted(true);
+        });
         let rooms: Vec<&str> = before.without.iter().map(|(room, _)| room.as_str()).collect();
         assert_eq!(rooms, ["another", "third"]);
         assert_eq!(net(&before.without[1].1), net(&after.without[1].1), "it has not seen the room");
@@ -325,20 +326,18 @@ mod training {
             *slope = if map.in_view[k / 4] { weight(k) } else { 0.0 };
         }
         net.learn(&map, &pass, &mut gradient, &mut of);
-        let loss = |net: &Net, pass: &mut Pass| -> f64 {
-            net.look(&map, pass);
-            let values = pass.answer.values.iter().enumerate();
-            values.map(|(k, value)| f64::from(weight(k)) * f64::from(*value)).sum()
-        };
         for part in 0..Net::PARTS.len() {
             let count = net.parts()[part].len();
             for k in (0..count).step_by(count.div_ceil(5)) {
                 let value = net.parts()[part][k];
                 let step = 1e-3;
-                net.parts_mut()[part][k] = value + step;
-                let more = loss(&net, &mut pass);
-                net.parts_mut()[part][k] = value - step;
-                let slope = (more - loss(&net, &mut pass)) / (2.0 * f64::from(step));
+                let [more, less] = [value + step, value - step].map(|value| {
+                    net.parts_mut()[part][k] = value;
+                    net.look(&map, &mut pass);
+                    let values = pass.answer.values.iter().enumerate();
+                    values.map(|(k, value)| f64::from(weight(k)) * f64::from(*value)).sum::<f64>()
+                });
+                let slope = (more - less) / (2.0 * f64::from(step));
                 net.parts_mut()[part][k] = value;
                 let off = (slope - f64::from(gradient.parts()[part][k])).abs();
                 assert!(off < 0.03 * (1.0 + slope.abs()), "{part} {k}: {slope}");

@@ -233,13 +233,12 @@ impl<'a> Cutter<'a> {
     fn row(&self, dy: i64) -> TemplateRow {
         let start = self.start_of(dy);
         let columns = self.columns_of_body(start);
-        let is_body = |column: &&Column| !self.behind(start, column).is_nan();
-        let ends = (columns.iter().find(is_body), columns.iter().rfind(is_body));
-        let (Some(first), Some(last)) = ends else {
+        let mut body = columns.iter().filter(|column| !self.behind(start, column).is_nan());
+        let Some(first) = body.next() else {
             return TemplateRow { dy, from: 0, to: 0, guard_from: 0, guard_to: 0, relief_m: 0.0 };
         };
         let from = first.dx;
-        let to = last.dx + 1;
+        let to = body.next_back().unwrap_or(first).dx + 1;
         let guard = ((GUARD_M * self.scale).round() as i64).max(1).min((to - from) / 4);
         TemplateRow {
             dy,
@@ -301,20 +300,21 @@ mod tests {
     fn slow_row(relief: &Relief, pose: Pose, dy: i64, half_width: i64) -> TemplateRow {
         let scale = pose.px_per_m();
         let (sin, cos) = (f64::from(pose.roll) * ROLL_STEP_DEG).to_radians().sin_cos();
-        let behind = |dx: i64| {
-            let x = dx as f64 / scale;
-            let y = dy as f64 / scale;
-            relief.at(x * cos + y * sin, y * cos - x * sin)
-        };
-        let person: Vec<i64> =
-            (-half_width..=half_width).filter(|x| !behind(*x).is_nan()).collect();
-        let [Some(first), Some(last)] = [person.first(), person.last()] else {
+        let y = dy as f64 / scale;
+        let person: Vec<(i64, f64)> = (-half_width..=half_width)
+            .map(|dx| {
+                let x = dx as f64 / scale;
+                (dx, relief.at(x * cos + y * sin, y * cos - x * sin))
+            })
+            .filter(|(_, behind)| !behind.is_nan())
+            .collect();
+        let [Some((first, _)), Some((last, _))] = [person.first(), person.last()] else {
             return TemplateRow { dy, from: 0, to: 0, guard_from: 0, guard_to: 0, relief_m: 0.0 };
         };
         let from = *first;
         let to = last + 1;
         let guard = ((GUARD_M * scale).round() as i64).max(1).min((to - from) / 4);
-        let sum: f64 = person.iter().map(|dx| behind(*dx) - relief.at(0.0, 0.0)).sum();
+        let sum: f64 = person.iter().map(|(_, behind)| behind - relief.at(0.0, 0.0)).sum();
         TemplateRow {
             dy,
             from: from + guard,
@@ -369,17 +369,12 @@ mod tests {
     #[test]
     fn the_head_is_narrower_than_the_shoulders() {
         let template = widths(Direction::Along, 0.0);
-        let width = |dy| {
-            template
-                .rows
-                .iter()
-                .find(|r| r.dy == dy)
-                .map(|r| (r.to - r.from + r.guard_to - r.guard_from) / 2)
-                .unwrap()
-        };
-        assert_eq!(width(-18), 0, "air above the head");
-        assert!((15..=20).contains(&width(0)), "head {}", width(0));
-        assert!((40..=52).contains(&width(38)), "shoulders {}", width(38));
+        // Air above the head, the head, and the shoulders.
+        for (dy, range) in [(-18, 0..=0), (0, 15..=20), (38, 40..=52)] {
+            let row = template.rows.iter().find(|row| row.dy == dy).unwrap();
+            let width = (row.to - row.from + row.guard_to - row.guard_from) / 2;
+            assert!(range.contains(&width), "{dy}: {width}");
+        }
     }
 
     #[test]

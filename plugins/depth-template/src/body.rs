@@ -43,6 +43,12 @@ pub struct Relief {
     extents: Vec<Range<usize>>,
 }
 
+/// Returns the place of a distance from the middle of a relief, in cells from its border.
+#[inline]
+fn cell_at(m: f64) -> f64 {
+    (m / Relief::SIDE_M + 0.5) * Relief::SIZE as f64
+}
+
 impl Relief {
     /// Cells along each side.
     pub const SIZE: usize = 200;
@@ -67,10 +73,10 @@ impl Relief {
     /// Returns a range right of the head centre, m, outside of which there is no body between two
     /// lines, m below it; it ends before it starts where there is none at all.
     pub fn extent(&self, from_m: f64, to_m: f64) -> (f64, f64) {
-        let line = |m: f64| ((m / Self::SIDE_M + 0.5) * Self::SIZE as f64).max(0.0) as usize;
+        let [from, to] = [from_m, to_m].map(|m| cell_at(m).max(0.0) as usize);
         // A cell more on each side, so that rounding cannot cut the border off.
-        let from = line(from_m).saturating_sub(1).min(Self::SIZE);
-        let lines = &self.extents[from..(line(to_m) + 2).clamp(from, Self::SIZE)];
+        let from = from.saturating_sub(1).min(Self::SIZE);
+        let lines = &self.extents[from..(to + 2).clamp(from, Self::SIZE)];
         let (first, last) = lines
             .iter()
             .fold((Self::SIZE, 0), |(first, last), e| (first.min(e.start), last.max(e.end)));
@@ -81,11 +87,10 @@ impl Relief {
     pub fn at(&self, right_m: f64, down_m: f64) -> f64 {
         // Within the relief no cell is negative, and the cast rounds as `floor` would, which is a
         // call on processors without an instruction for it.
-        let cell = |m: f64| (m / Self::SIDE_M + 0.5) * Self::SIZE as f64;
-        let x = cell(right_m);
-        let y = cell(down_m);
-        let inside = |v: f64| 0.0 <= v && v < Self::SIZE as f64;
-        if inside(x) && inside(y) {
+        let x = cell_at(right_m);
+        let y = cell_at(down_m);
+        let size = Self::SIZE as f64;
+        if 0.0 <= x && x < size && 0.0 <= y && y < size {
             self.cells[y as i32 as usize * Self::SIZE + x as i32 as usize]
         } else {
             f64::NAN
@@ -138,15 +143,14 @@ struct Ellipsoid {
 impl Ellipsoid {
     fn new(part: &Part, turned: &Rotation3<f64>, direction: &Vector3<f64>) -> Self {
         let squared = Vector3::from(part.radii).map(|r| r * r);
-        let turn = |diagonal: Vector3<f64>| {
+        let [shape, spread] = [squared.map(|r| 1.0 / r), squared].map(|diagonal| {
             turned.matrix() * Matrix3::from_diagonal(&diagonal) * turned.matrix().transpose()
-        };
-        let shape = turn(squared.map(|r| 1.0 / r));
+        });
         let shape_along = shape * direction;
         Self {
             centre: turned * Vector3::from(part.centre),
             shape,
-            spread: turn(squared),
+            spread,
             shape_along,
             along: direction.dot(&shape_along),
         }
@@ -155,14 +159,10 @@ impl Ellipsoid {
     /// Returns the cells along an axis of the image in which the ellipsoid can lie.
     fn cells(&self, axis: &Vector3<f64>) -> Range<usize> {
         // A cell more on each side, so that rounding cannot cut the border off.
-        fn cell(m: f64) -> f64 {
-            (m / Relief::SIDE_M + 0.5) * Relief::SIZE as f64
-        }
-
         let middle = axis.dot(&self.centre);
         let reach = axis.dot(&(self.spread * axis)).sqrt();
-        let from = (cell(middle - reach).floor() - 1.0).max(0.0) as usize;
-        let to = (cell(middle + reach).ceil() + 1.0).max(0.0) as usize;
+        let from = (cell_at(middle - reach).floor() - 1.0).max(0.0) as usize;
+        let to = (cell_at(middle + reach).ceil() + 1.0).max(0.0) as usize;
         from..to.min(Relief::SIZE)
     }
 
@@ -188,23 +188,23 @@ mod tests {
         let (sin, cos) = pitch_rad.sin_cos();
         let forward = Vector3::new(cos, 0.0, -sin);
         let turned = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw_rad);
-        let hit = |part: &Part, origin: &Vector3<f64>| {
-            let inverse = Vector3::from(part.radii).map(|r| 1.0 / (r * r));
-            let diagonal = Matrix3::from_diagonal(&inverse);
-            let shape = turned.matrix() * diagonal * turned.matrix().transpose();
-            let origin = origin - turned * Vector3::from(part.centre);
-            let a = forward.dot(&(shape * forward));
-            let b = origin.dot(&(shape * forward));
-            let c = origin.dot(&(shape * origin)) - 1.0;
-            let discriminant = b * b - a * c;
-            (discriminant >= 0.0).then(|| (-b - discriminant.sqrt()) / a)
-        };
         (0..Relief::SIZE * Relief::SIZE)
             .map(|i| {
                 let x = middle_m(i % Relief::SIZE);
                 let y = middle_m(i / Relief::SIZE);
                 let origin = Vector3::new(0.0, -1.0, 0.0) * x + Vector3::new(-sin, 0.0, -cos) * y;
-                body_parts().iter().filter_map(|part| hit(part, &origin)).fold(f64::NAN, f64::min)
+                let hits = body_parts().into_iter().filter_map(|part| {
+                    let inverse = Vector3::from(part.radii).map(|r| 1.0 / (r * r));
+                    let diagonal = Matrix3::from_diagonal(&inverse);
+                    let shape = turned.matrix() * diagonal * turned.matrix().transpose();
+                    let origin = origin - turned * Vector3::from(part.centre);
+                    let a = forward.dot(&(shape * forward));
+                    let b = origin.dot(&(shape * forward));
+                    let c = origin.dot(&(shape * origin)) - 1.0;
+                    let discriminant = b * b - a * c;
+                    (discriminant >= 0.0).then(|| (-b - discriminant.sqrt()) / a)
+                });
+                hits.fold(f64::NAN, f64::min)
             })
             .collect()
     }
@@ -224,26 +224,20 @@ mod tests {
 
     #[test]
     fn a_point_is_found_without_rounding_towards_minus_infinity() {
-        fn cell(m: f64) -> f64 {
-            ((m / Relief::SIDE_M + 0.5) * Relief::SIZE as f64).floor()
-        }
-
-        fn inside(v: f64) -> bool {
-            0.0 <= v && v < Relief::SIZE as f64
-        }
-
         let relief = render(0.0, 0.0);
-        let slow = |right_m: f64, down_m: f64| {
-            let x = cell(right_m);
-            let y = cell(down_m);
-            let is_inside = inside(x) && inside(y);
-            if is_inside { relief.cells[y as usize * Relief::SIZE + x as usize] } else { f64::NAN }
-        };
+        let size = Relief::SIZE as f64;
         for i in -130..130 {
             for j in -130..130 {
                 let x = f64::from(i) * 0.004_99;
                 let y = f64::from(j) * 0.005;
-                assert_eq!(relief.at(x, y).to_bits(), slow(x, y).to_bits(), "{x} {y}");
+                let [column, row] = [x, y].map(|m| ((m / Relief::SIDE_M + 0.5) * size).floor());
+                let is_inside = (0.0..size).contains(&column) && (0.0..size).contains(&row);
+                let slow = if is_inside {
+                    relief.cells[row as usize * Relief::SIZE + column as usize]
+                } else {
+                    f64::NAN
+                };
+                assert_eq!(relief.at(x, y).to_bits(), slow.to_bits(), "{x} {y}");
             }
         }
     }

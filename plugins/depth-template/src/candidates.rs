@@ -44,15 +44,12 @@ const ASLANT_M: f64 = 0.12;
 pub fn boundary(rows: &RowSums, local: &Local, config: &DepthTemplateConfig) -> bool {
     let d = config.boundary_distance_m;
     let margin = config.boundary_margin_m;
-    let behind = |right: f64, down: f64| {
+    let points = [(-d, 0.0), (d, 0.0), (0.0, -d)].map(|(right, down)| {
         let (x, y) = local.offset(right, down);
         rows.depth_m(x, y).map(|z| z - local.depth_m)
-    };
-    let passes = |m: &f64| *m > margin;
-    let contradicts = |m: &f64| m.abs() <= margin;
-    let points = [behind(-d, 0.0), behind(d, 0.0), behind(0.0, -d)];
-    let passed = points.iter().flatten().filter(|m| passes(m)).count();
-    let contradicted = points.iter().flatten().filter(|m| contradicts(m)).count();
+    });
+    let passed = points.iter().flatten().filter(|m| **m > margin).count();
+    let contradicted = points.iter().flatten().filter(|m| m.abs() <= margin).count();
     !is_below_something(rows, local, config)
         && (passed >= config.boundary_min_passed as usize || contradicted == 0)
 }
@@ -64,28 +61,29 @@ const EDGE_REACH_M: f64 = 0.30;
 
 /// Returns the width of the object that the head belongs to, at the head's own height, m.
 pub fn head_width_m(rows: &RowSums, local: &Local) -> f64 {
-    let reach = |side: f64| {
-        let steps = (EDGE_REACH_M * local.px_per_m) as i64 + 1;
-        let allowed_holes = (0.03 * local.px_per_m).max(1.0) as i64;
-        let mut last = 0;
-        let mut holes = 0;
-        for step in 1..=steps {
-            let (x, y) = local.offset(side * step as f64 / local.px_per_m, 0.0);
-            match rows.value(x, y) {
-                None => return last.max((0.1 * local.px_per_m) as i64),
-                Some(0) if holes < allowed_holes => holes += 1,
-                Some(v)
-                    if v > 0
-                        && (RowSums::UNITS / f64::from(v) - local.depth_m).abs() < SAME_HEAD_M =>
-                {
-                    last = step;
-                }
-                Some(_) => break,
+    (head_reach(rows, local, -1.0) + head_reach(rows, local, 1.0) + 1) as f64 / local.px_per_m
+}
+
+/// Returns how far a head reaches to the left (-1) or to the right (1), pixels.
+fn head_reach(rows: &RowSums, local: &Local, side: f64) -> i64 {
+    let steps = (EDGE_REACH_M * local.px_per_m) as i64 + 1;
+    let allowed_holes = (0.03 * local.px_per_m).max(1.0) as i64;
+    let mut last = 0;
+    let mut holes = 0;
+    for step in 1..=steps {
+        let (x, y) = local.offset(side * step as f64 / local.px_per_m, 0.0);
+        match rows.value(x, y) {
+            None => return last.max((0.1 * local.px_per_m) as i64),
+            Some(0) if holes < allowed_holes => holes += 1,
+            Some(v)
+                if v > 0 && (RowSums::UNITS / f64::from(v) - local.depth_m).abs() < SAME_HEAD_M =>
+            {
+                last = step;
             }
+            Some(_) => break,
         }
-        last
-    };
-    (reach(-1.0) + reach(1.0) + 1) as f64 / local.px_per_m
+    }
+    last
 }
 
 /// Part of the probes on the chest and belly that show a body under the head;

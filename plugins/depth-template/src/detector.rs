@@ -438,10 +438,11 @@ mod tests {
             n if n < 101 => 1.0 + n as f32,
             _ => f32::NAN,
         });
-        let depth_m = |percentile| RowSums::UNITS / background(&depth, percentile);
         let usual = DepthTemplateConfig::default().background_percentile;
-        assert!((depth_m(usual) - 91.0).abs() < 1e-6, "{}", depth_m(usual));
-        assert!((depth_m(10.0) - 11.0).abs() < 1e-6 && (depth_m(200.0) - 101.0).abs() < 1e-6);
+        for (percentile, expected_m) in [(usual, 91.0), (10.0, 11.0), (200.0, 101.0)] {
+            let depth_m = RowSums::UNITS / background(&depth, percentile);
+            assert!((depth_m - expected_m).abs() < 1e-6, "{percentile}: {depth_m}");
+        }
         assert_eq!(background(&DepthImage::filled(4, 4, f32::NAN), 90.0), 0.0);
     }
 

@@ -103,7 +103,7 @@ impl Matcher {
     ) -> Option<Match> {
         let mut tally = Tally::default();
         let face = Face::new(&self.config, depth_m);
-        let inside = |v: i64| v.clamp(0, rows.width() as i64) as usize;
+        let width = rows.width() as i64;
         // Every fourth row first: a cost that is too high shows sooner all over the
         // silhouette than from the top of the head down.
         let all = &template.rows;
@@ -117,10 +117,12 @@ impl Matcher {
                 tally.outside += wanted[0] + wanted[1];
                 continue;
             };
-            let person = (line, inside(x + row.from), inside(x + row.to));
-            self.foreground(&mut tally, rows, person, &face, row.relief_m);
+            let [first, end] =
+                [x + row.from, x + row.to].map(|column| column.clamp(0, width) as usize);
+            self.foreground(&mut tally, rows, (line, first, end), &face, row.relief_m);
             for ((from, to), wanted) in sides.into_iter().zip(wanted) {
-                let run = (line, inside(from), inside(to).max(inside(from)));
+                let [first, end] = [from, to].map(|column| column.clamp(0, width) as usize);
+                let run = (line, first, end.max(first));
                 tally.outside += wanted - (run.2 - run.1) as f64;
                 self.background(&mut tally, rows, run, &face);
             }
@@ -145,9 +147,8 @@ impl Matcher {
         let error = sums.squared_error(expected);
         tally.foreground_cost += match self.config.cost {
             Cost::Robust => {
-                let off = |m: f64| RowSums::UNITS / (expected_m - m).max(0.1) - expected;
-                let free = off(face.free_m).powi(2);
-                let full = off(face.full_m).powi(2);
+                let [free, full] = [face.free_m, face.full_m]
+                    .map(|m| (RowSums::UNITS / (expected_m - m).max(0.1) - expected).powi(2));
                 count * ((error / count - free) / (full - free)).clamp(0.0, 1.0)
             }
             Cost::Squared => error,
@@ -215,6 +216,11 @@ mod tests {
     use super::*;
     use crate::bank::{Bank, Direction, Pose};
 
+    /// Returns the readings among some pixels.
+    fn readings(pixels: &[Option<u16>]) -> Vec<f64> {
+        pixels.iter().flatten().filter(|value| **value > 0).map(|value| f64::from(*value)).collect()
+    }
+
     /// The robust cost, pixel by pixel, straight from its definition.
     fn slow(
         config: &DepthTemplateConfig,
@@ -232,35 +238,35 @@ mod tests {
         let mut wrong = 0.0;
         for row in &t.rows {
             let window = x - t.half_width..x + t.half_width + 1;
-            let is_person = |u: i64| x + row.from <= u && u < x + row.to;
-            let pixel = |u: i64| rows.value(u, y + row.dy);
-            let values = |keep: &dyn Fn(i64) -> bool| -> Vec<f64> {
-                let kept = window.clone().filter(|u| keep(*u));
-                kept.filter_map(|u| pixel(u).filter(|v| *v > 0).map(f64::from)).collect()
-            };
-            let fg = values(&is_person);
-            person += window.clone().filter(|u| is_person(*u)).count() as f64;
+            let [person_pixels, left, right] = [
+                x + row.from..x + row.to,
+                i64::MIN..x + row.guard_from,
+                x + row.guard_to..i64::MAX,
+            ]
+            .map(|part| -> Vec<Option<u16>> {
+                let columns = window.clone().filter(|u| part.contains(u));
+                columns.map(|u| rows.value(u, y + row.dy)).collect()
+            });
+            let fg = readings(&person_pixels);
+            person += person_pixels.len() as f64;
             seen += fg.len() as f64;
             let e = units / (z + row.relief_m).max(0.1);
-            let off = |m: f64| units / (z + row.relief_m - m).max(0.1) - e;
             let noise = config.relief_per_m2 * z * z;
-            let free = off(config.relief_free_m + noise).powi(2);
-            let full = off(config.relief_full_m + noise).powi(2);
+            let [free, full] = [config.relief_free_m, config.relief_full_m]
+                .map(|m| (units / (z + row.relief_m - (m + noise)).max(0.1) - e).powi(2));
             let mean_error =
                 fg.iter().map(|v| (v - e).powi(2)).sum::<f64>() / fg.len().max(1) as f64;
             bad += fg.len() as f64 * ((mean_error - free) / (full - free)).clamp(0.0, 1.0);
-            let left = |u: i64| u < x + row.guard_from;
-            let right = |u: i64| u >= x + row.guard_to;
-            for side in [&left as &dyn Fn(i64) -> bool, &right] {
-                beside += window.clone().filter(|u| side(*u)).count() as f64;
-                for u in window.clone().filter(|u| side(*u)) {
-                    wrong += match pixel(u) {
+            for side in [left, right] {
+                beside += side.len() as f64;
+                for pixel in &side {
+                    wrong += match pixel {
                         None => 1.0,
                         Some(0) => config.unknown_cost,
                         Some(_) => 0.0,
                     };
                 }
-                let bg = values(side);
+                let bg = readings(&side);
                 if bg.is_empty() {
                     continue;
                 }
@@ -298,13 +304,13 @@ mod tests {
                 ..Default::default()
             };
             let fast = Matcher::new(&config, 300.0).fit(&rows, template, x, y, z).map(|m| m.cost);
-            let up_to = |most: f64| {
+            let [at_cost, at_most] = [fast.unwrap_or(most), most].map(|most| {
                 let found = Matcher::new(&config, 300.0).fit_up_to(most, &rows, template, (x, y), z);
                 found.map(|m| m.cost)
-            };
-            prop_assert!(fast.is_none_or(|cost| up_to(cost) == fast));
-            prop_assert!(up_to(most).is_none_or(|cost| Some(cost) == fast));
-            prop_assert!(fast.is_none_or(|cost| cost > most || up_to(most) == fast));
+            });
+            prop_assert!(fast.is_none() || at_cost == fast);
+            prop_assert!(at_most.is_none_or(|cost| Some(cost) == fast));
+            prop_assert!(fast.is_none_or(|cost| cost > most || at_most == fast));
             let slow = slow(&config, &rows, template, x, y, z);
             prop_assert_eq!(fast.is_some(), slow.is_some());
             if let (Some(a), Some(b)) = (fast, slow) {

@@ -31,9 +31,12 @@ pub fn group(cells: &mut [Cell], separation_m: f64) -> Vec<Group> {
     cells.sort_by(|a, b| a.cost.total_cmp(&b.cost).then((a.y, a.x).cmp(&(b.y, b.x))));
     let mut groups: Vec<Group> = Vec::new();
     for cell in cells.iter() {
-        let distance = |g: &Group| (g.best.head.xy() - cell.head.xy()).norm();
-        match groups.iter_mut().min_by(|a, b| distance(a).total_cmp(&distance(b))) {
-            Some(nearest) if distance(nearest) < separation_m => nearest.cells += 1,
+        let apart_m = groups.iter_mut().map(|group| {
+            let off = group.best.head.xy() - cell.head.xy();
+            (off.norm(), group)
+        });
+        match apart_m.min_by(|(a, _), (b, _)| a.total_cmp(b)) {
+            Some((apart_m, nearest)) if apart_m < separation_m => nearest.cells += 1,
             _ => groups.push(Group { best: *cell, cells: 1 }),
         }
     }

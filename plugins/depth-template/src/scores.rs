@@ -89,8 +89,8 @@ impl Scores {
 
     /// Scores of `image`, at least of the columns `from..to`.
     pub fn prepare(&mut self, image: &Arc<Working>, from: i64, to: i64) {
-        let clip = |x: i64| x.clamp(0, image.0.width() as i64) as usize;
-        let wanted = clip(from)..clip(to);
+        let [start, end] = [from, to].map(|x| x.clamp(0, image.0.width() as i64) as usize);
+        let wanted = start..end;
         let same = Arc::ptr_eq(&self.image, image);
         let covered = self.columns.start <= wanted.start && wanted.end <= self.columns.end;
         if same && covered {
@@ -216,11 +216,11 @@ mod tests {
     #[test]
     fn a_pixel_speaks_for_the_person_at_its_depth_and_against_one_in_front_of_it() {
         let one = f64::from(ONE);
-        let covered = |seen_m| f64::from(verdict(2.0, seen_m).covered) / one;
-        assert!(covered(2.0) > 0.9);
-        assert_eq!(covered(5.0), -1.0, "one looks past a person who is not there");
-        assert_eq!(covered(1.0), 0.0, "something nearer hides the person");
-        assert_eq!(covered(f32::NAN), 0.0);
+        assert!(f64::from(verdict(2.0, 2.0).covered) > 0.9 * one);
+        // One looks past a person who is not there; something nearer hides the person.
+        for (seen_m, expected) in [(5.0, -1.0), (1.0, 0.0), (f32::NAN, 0.0)] {
+            assert_eq!(f64::from(verdict(2.0, seen_m).covered) / one, expected, "{seen_m}");
+        }
         assert!(verdict(2.0, 2.0).beside > ONE / 2 && verdict(2.0, 5.0).beside == 0);
     }
 

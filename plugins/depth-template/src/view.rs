@@ -140,9 +140,10 @@ impl MetricImage {
 
     /// The pixel of the image that is nearest to a reduced one.
     pub fn nearest_inside(&self, x: i64, y: i64) -> (i64, i64) {
-        let last = |cells: usize| (cells as i64 * Self::GRID - 1).max(0);
         let lines = self.geometry.len() / self.columns.max(1);
-        (x.clamp(0, last(self.columns)), y.clamp(0, last(lines)))
+        let [right, bottom] =
+            [self.columns, lines].map(|cells| (cells as i64 * Self::GRID - 1).max(0));
+        (x.clamp(0, right), y.clamp(0, bottom))
     }
 
     /// The reduced pixel of a point in the robot frame.
@@ -180,8 +181,9 @@ impl MetricImage {
 
     /// The full-size pixels of a run in `lines` reduced rows from `line` on.
     pub fn full_run(&self, line: i64, (from, to): (i64, i64), lines: i64) -> Rect {
-        let size = |pixels: i64| self.scale * pixels as f64;
-        Rect::new(size(from), size(line), size(to - from), size(lines))
+        let [x, y, width, height] =
+            [from, line, to - from, lines].map(|pixels| self.scale * pixels as f64);
+        Rect::new(x, y, width, height)
     }
 
     /// The upper-body square of a head at a reduced pixel and depth.

@@ -121,27 +121,18 @@ impl Weigher {
         let image = frame.derived::<Working>()?;
         let mut tools = self.tools();
         let view = tools.view_of(frame, &image);
-        let log = |scene: &[Person]| {
-            let mut cast = |way: Option<Direction>| {
-                let mut cast: Vec<PlacedPerson> = scene
-                    .iter()
-                    .filter_map(|p| {
-                        let way = way.unwrap_or_else(|| direction(p, &frame.camera));
-                        tools.place(p, way, &frame.camera, &view)
-                    })
-                    .collect();
-                cast.sort_by(|a, b| a.depth_m.total_cmp(&b.depth_m).then(a.x.cmp(&b.x)));
-                likelihood.log_likelihood(&cast)
-            };
-            match scene {
+        let mut logs = Vec::new();
+        for scene in scenes {
+            logs.push(match scene {
                 [] => 0.0,
                 [_] => {
-                    Direction::ALL.map(|way| cast(Some(way))).into_iter().fold(f64::MIN, f64::max)
+                    let ways = Direction::ALL.map(|way| tools.cast(scene, Some(way), frame, &view));
+                    ways.iter().map(|cast| likelihood.log_likelihood(cast)).fold(f64::MIN, f64::max)
                 }
-                _ => cast(None),
-            }
-        };
-        Ok(scenes.map(log).collect())
+                _ => likelihood.log_likelihood(&tools.cast(scene, None, frame, &view)),
+            });
+        }
+        Ok(logs)
     }
 
     fn tools(&self) -> MutexGuard<'_, Tools> {
@@ -209,6 +200,24 @@ impl Likelihood for Weigher {
 }
 
 impl Tools {
+    /// Places the people of a scene, the nearest first; where no `way` is given, each faces where
+    /// it moves.
+    fn cast(
+        &mut self,
+        scene: &[Person],
+        way: Option<Direction>,
+        frame: &Frame,
+        view: &MetricImage,
+    ) -> Vec<PlacedPerson> {
+        let mut cast = Vec::new();
+        for person in scene {
+            let way = way.unwrap_or_else(|| direction(person, &frame.camera));
+            cast.extend(self.place(person, way, &frame.camera, view));
+        }
+        cast.sort_by(|a, b| a.depth_m.total_cmp(&b.depth_m).then(a.x.cmp(&b.x)));
+        cast
+    }
+
     /// Returns the visible bodies of a scene, without the parts that nearer ones hide, as runs in
     /// the image.
     fn silhouettes(&mut self, frame: &Frame, image: &Working, scene: &[Person]) -> Vec<Vec<Rect>> {
@@ -217,17 +226,23 @@ impl Tools {
             .iter()
             .map(|p| self.place(p, direction(p, &frame.camera), &frame.camera, &view))
             .collect();
-        let visible = |person: &PlacedPerson| -> Vec<Rect> {
-            let rows = person.rows(image.0.height() as i64);
-            let runs = rows.flat_map(|(line, row)| {
+        let mut visible = Vec::with_capacity(cast.len());
+        for person in &cast {
+            let mut runs = Vec::new();
+            let Some(person) = person else {
+                visible.push(runs);
+                continue;
+            };
+            for (line, row) in person.rows(image.0.height() as i64) {
                 let nearer = cast.iter().flatten().filter(|p| p.depth_m < person.depth_m);
                 let bodies: Vec<Span> = nearer.filter_map(|p| p.body(line)).collect();
                 let step = person.silhouette.step;
-                outside(person.inside(row), bodies).into_iter().map(move |run| (line, run, step))
-            });
-            runs.map(|(line, run, step)| view.full_run(line, run, step)).collect()
-        };
-        cast.iter().map(|person| person.as_ref().map(visible).unwrap_or_default()).collect()
+                let shown = outside(person.inside(row), bodies);
+                runs.extend(shown.into_iter().map(|run| view.full_run(line, run, step)));
+            }
+            visible.push(runs);
+        }
+        visible
     }
 
     /// The view of this frame's camera; it seldom changes.
@@ -341,11 +356,10 @@ impl Tools {
                 continue;
             }
             let pixels = self.scores.row(line as usize, person.levels.behind(row.relief_m));
-            let beside = |side| pixels.of(common(side, body)).beside;
-            let [left, right] = person.beside(row);
+            let [left, right] = person.beside(row).map(|side| pixels.of(common(side, body)).beside);
             let covered =
                 if is_nearer { pixels.of(common(person.inside(row), body)).covered } else { 0 };
-            taken.add(covered, beside(left), beside(right));
+            taken.add(covered, left, right);
         }
         taken
     }
@@ -432,8 +446,9 @@ impl PlacedPerson {
     /// Returns the lines of the window.
     pub fn lines(&self) -> Span {
         let rows = &self.silhouette.rows;
-        let dy = |row: Option<&TemplateRow>| self.y + row.map_or(0, |row| row.dy);
-        (dy(rows.first()), dy(rows.last()) + 1)
+        let [first, last] =
+            [rows.first(), rows.last()].map(|row| self.y + row.map_or(0, |row| row.dy));
+        (first, last + 1)
     }
 
     /// The row of the silhouette in a line of the image; `None` outside of the window.

@@ -75,11 +75,11 @@ fn one_person_is_found_where_she_stands_at_any_resolution() {
 #[test]
 fn the_centre_of_the_head_is_as_far_behind_its_surface_as_told() {
     let frame = frame(320, 5.0, &[Point3::new(2.5, 0.0, 1.6)]);
-    let depth_m = |centre_behind_m| {
+    let [far_m, near_m] = [0.08, 0.03].map(|centre_behind_m| {
         let config = DepthTemplateConfig { centre_behind_m, ..DepthTemplateConfig::default() };
         frame.camera.depth_of(&discover(config, &frame).0[0].position)
-    };
-    assert!((depth_m(0.08) - depth_m(0.03) - 0.05).abs() < 1e-9);
+    });
+    assert!((far_m - near_m - 0.05).abs() < 1e-9);
 }
 
 #[test]
@@ -178,7 +178,8 @@ fn settings_that_hold_nothing_are_refused() {
 fn the_papers_background_is_the_wall_where_the_percentile_is_high() {
     let head = Point3::new(2.5, 0.0, 1.6);
     let scene = frame(320, 6.0, &[head]);
-    let score = |background_percentile| {
+    let usual = DepthTemplateConfig::default().background_percentile;
+    let [usual, low] = [usual, 10.0].map(|background_percentile| {
         let config = DepthTemplateConfig {
             cost: Cost::Squared,
             background_percentile,
@@ -189,9 +190,8 @@ fn the_papers_background_is_the_wall_where_the_percentile_is_high() {
         let (found, _) = discover(config, &scene);
         let here = found.iter().filter(|d| (d.position - head).norm() < 0.3).map(|d| d.score);
         here.fold(f64::MIN, f64::max)
-    };
-    let usual = score(DepthTemplateConfig::default().background_percentile);
-    assert!(usual > score(10.0) + 0.5, "{usual} {}", score(10.0));
+    });
+    assert!(usual > low + 0.5, "{usual} {low}");
 }
 
 #[test]
@@ -212,12 +212,13 @@ fn the_depth_of_a_head_is_the_less_certain_the_farther_away_it_is() {
 fn a_confirmed_track_is_judged_by_a_cost_of_its_own() {
     let head = Point3::new(2.5, 0.0, 1.6);
     let scene = frame(640, 6.0, &[head]);
-    let followed = |confirmed: bool, discover_cost: f64, follow_cost: f64| {
+    for (confirmed, discover_cost, follow_cost, expected) in
+        [(true, 0.0, 10.0, 1), (false, 0.0, 10.0, 0), (true, 10.0, 0.0, 0), (false, 10.0, 0.0, 1)]
+    {
         let config = DepthTemplateConfig { discover_cost, follow_cost, ..Default::default() };
         let mut detector = DepthTemplate::new(config).unwrap();
         let track = track_at(head, &scene.camera).with_confirmed(confirmed);
-        detector.detect(&scene, &Query::Track(&track), &mut Funnel::default()).unwrap().len()
-    };
-    assert_eq!([followed(true, 0.0, 10.0), followed(false, 0.0, 10.0)], [1, 0]);
-    assert_eq!([followed(true, 10.0, 0.0), followed(false, 10.0, 0.0)], [0, 1]);
+        let found = detector.detect(&scene, &Query::Track(&track), &mut Funnel::default()).unwrap();
+        assert_eq!(found.len(), expected, "{confirmed} {discover_cost} {follow_cost}");
+    }
 }

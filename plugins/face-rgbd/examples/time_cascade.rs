@@ -8,10 +8,9 @@ use tagalong_geometry::Rect;
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
-    let mut next = || arguments.next().expect("CASCADE.xml PICTURE RUNS");
-    let cascade = next();
-    let picture = next();
-    let runs = next().parse::<usize>().expect("a number");
+    let [cascade, picture, runs] =
+        [(); 3].map(|()| arguments.next().expect("CASCADE.xml PICTURE RUNS"));
+    let runs = runs.parse::<usize>().expect("a number");
     let text = std::fs::read_to_string(cascade).expect("the cascade can be read");
     let cascade = Cascade::from_xml(&text).expect("it is a cascade");
     let image = image::open(picture).expect("the picture can be read").into_luma8();

@@ -108,40 +108,54 @@ impl Cascade {
         Part { x: 1, y: 1, width: self.width - 2, height: self.height - 2 }
     }
 
+    /// Whether a part, so many times as wide and high, lies in the window.
+    fn holds_part(&self, part: &Part, times: usize) -> bool {
+        let right = part.width.checked_mul(times).and_then(|w| w.checked_add(part.x));
+        let bottom = part.height.checked_mul(times).and_then(|h| h.checked_add(part.y));
+        right.is_some_and(|x| x <= self.width) && bottom.is_some_and(|y| y <= self.height)
+    }
+
+    /// Whether a turned part lies in the window.
+    fn holds_tilted(&self, part: &Part) -> bool {
+        let down = part.width.checked_add(part.height);
+        let right = part.x.checked_add(part.width);
+        let bottom = down.map(|down| down + part.y);
+        let is_inside = right.is_some_and(|x| x <= self.width) && part.x >= part.height;
+        is_inside && bottom.is_some_and(|y| y <= self.height)
+    }
+
+    /// Whether a feature can be computed in the window.
+    fn holds_feature(&self, feature: &Feature) -> bool {
+        match feature {
+            Feature::Haar(parts) | Feature::Tilted(parts) => {
+                let is_tilted = matches!(feature, Feature::Tilted(_));
+                let mut each = parts.iter();
+                (2..=3).contains(&parts.len())
+                    && each.all(|(part, weight)| {
+                        let is_held = if is_tilted {
+                            self.holds_tilted(part)
+                        } else {
+                            self.holds_part(part, 1)
+                        };
+                        is_held && weight.is_finite()
+                    })
+            }
+            Feature::Binary(part) => self.holds_part(part, 3),
+        }
+    }
+
     /// Checks that a cascade can be run: parts inside the window, known features, finite trees.
     ///
     /// # Errors
     /// The first fault, as one sentence.
     pub fn check(&self) -> Result<(), String> {
-        fn are_right(parts: &[(Part, f32)], fits: &dyn Fn(&Part) -> bool) -> bool {
-            (2..=3).contains(&parts.len())
-                && parts.iter().all(|(part, weight)| fits(part) && weight.is_finite())
-        }
-
         if !(8..=256).contains(&self.width) || !(8..=256).contains(&self.height) {
             return Err(format!("its windows are {} x {} pixels", self.width, self.height));
         }
         if self.stages.is_empty() {
             return Err("it has no stages".into());
         }
-        let fits = |part: &Part, times: usize| {
-            let right = part.width.checked_mul(times).and_then(|w| w.checked_add(part.x));
-            let bottom = part.height.checked_mul(times).and_then(|h| h.checked_add(part.y));
-            right.is_some_and(|x| x <= self.width) && bottom.is_some_and(|y| y <= self.height)
-        };
-        let fits_tilted = |part: &Part| {
-            let down = part.width.checked_add(part.height);
-            let right = part.x.checked_add(part.width);
-            let bottom = down.map(|down| down + part.y);
-            let is_inside = right.is_some_and(|x| x <= self.width) && part.x >= part.height;
-            is_inside && bottom.is_some_and(|y| y <= self.height)
-        };
-        let is_right = |feature: &Feature| match feature {
-            Feature::Haar(parts) => are_right(parts, &|part| fits(part, 1)),
-            Feature::Tilted(parts) => are_right(parts, &fits_tilted),
-            Feature::Binary(part) => fits(part, 3),
-        };
-        if let Some(bad) = self.features.iter().position(|feature| !is_right(feature)) {
+        if let Some(bad) = self.features.iter().position(|feature| !self.holds_feature(feature)) {
             return Err(format!("its feature {bad} does not lie in the window"));
         }
         let trees = self.stages.iter().flat_map(|stage| &stage.trees);

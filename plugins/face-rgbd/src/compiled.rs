@@ -124,18 +124,22 @@ pub struct Block {
 impl Compiled {
     /// Computes the offsets for the sums of a level; `cascade` was checked.
     pub fn new(cascade: &Cascade, level: &Level) -> Self {
-        let look = |feature: &Feature| match feature {
-            Feature::Haar(parts) => WindowFeature::Haar(rectangles(parts, |p| corners(p, level))),
-            Feature::Tilted(parts) => {
-                WindowFeature::Haar(rectangles(parts, |part| tilted_corners(part, level)))
-            }
-            Feature::Binary(part) => WindowFeature::Binary(std::array::from_fn(|k: usize| {
-                let x = part.x + k % 4 * part.width;
-                let y = part.y + k / 4 * part.height;
-                level.offset(x, y) as u32
-            })),
-        };
-        let looks: Vec<WindowFeature> = cascade.features.iter().map(look).collect();
+        let mut looks = Vec::with_capacity(cascade.features.len());
+        for feature in &cascade.features {
+            looks.push(match feature {
+                Feature::Haar(parts) => {
+                    WindowFeature::Haar(rectangles(parts, |part| corners(part, level)))
+                }
+                Feature::Tilted(parts) => {
+                    WindowFeature::Haar(rectangles(parts, |part| tilted_corners(part, level)))
+                }
+                Feature::Binary(part) => WindowFeature::Binary(std::array::from_fn(|k: usize| {
+                    let x = part.x + k % 4 * part.width;
+                    let y = part.y + k / 4 * part.height;
+                    level.offset(x, y) as u32
+                })),
+            });
+        }
         let stages = cascade.stages.iter().map(|stage| Stage {
             threshold: stage.threshold,
             weak: stage.trees.iter().map(|tree| Weak::new(tree, &looks)).collect(),
@@ -255,9 +259,10 @@ impl Compiled {
             }
             Weak::Pair(pair) => {
                 let Pair { parts, thresholds, values } = &**pair;
-                let is_no = |k: usize| haar(&parts[k], sums) * contrast >= thresholds[k];
-                let side = usize::from(is_no(0));
-                values[2 * side + usize::from(is_no(1 + side))]
+                let side = usize::from(haar(&parts[0], sums) * contrast >= thresholds[0]);
+                let child = 1 + side;
+                let is_no = haar(&parts[child], sums) * contrast >= thresholds[child];
+                values[2 * side + usize::from(is_no)]
             }
             Weak::Tree(tree) => self.leaf(tree, sums, contrast),
         }
@@ -339,10 +344,15 @@ fn sum(sums: &[u32], corners: &Corners) -> u32 {
 
 pub(crate) fn haar(parts: &Haar, sums: &[u32]) -> f32 {
     let [first, second, third] = parts;
+    let two = weighted_sum(first, sums) + weighted_sum(second, sums);
+    if third.1 == 0.0 { two } else { two + weighted_sum(third, sums) }
+}
+
+/// Returns the sum of a rectangle times its weight.
+#[inline]
+fn weighted_sum((corners, weight): &(Corners, f32), sums: &[u32]) -> f32 {
     // Sums over a window fit into i32, which vector instructions convert to f32 directly.
-    let of = |(corners, weight): &(Corners, f32)| weight * sum(sums, corners) as i32 as f32;
-    let two = of(first) + of(second);
-    if third.1 == 0.0 { two } else { two + of(third) }
+    weight * sum(sums, corners) as i32 as f32
 }
 
 /// Neighbours clockwise from the upper left, and the middle, as the upper left corners of blocks
@@ -351,9 +361,14 @@ const AROUND: [usize; 8] = [0, 1, 2, 6, 10, 9, 8, 4];
 const MIDDLE: usize = 5;
 
 fn pattern(corners: &[u32; 16], sums: &[u32]) -> usize {
-    let block = |k: usize| sum(sums, &[corners[k], corners[k + 1], corners[k + 4], corners[k + 5]]);
-    let middle = block(MIDDLE);
-    AROUND.iter().fold(0, |bits, k| bits << 1 | usize::from(block(*k) >= middle))
+    let middle = block_sum(corners, sums, MIDDLE);
+    AROUND.iter().fold(0, |bits, k| bits << 1 | usize::from(block_sum(corners, sums, *k) >= middle))
+}
+
+/// Returns the sum of the block from this corner on, of corners in rows of four.
+#[inline]
+fn block_sum(corners: &[u32; 16], sums: &[u32], k: usize) -> u32 {
+    sum(sums, &[corners[k], corners[k + 1], corners[k + 4], corners[k + 5]])
 }
 
 /// Returns the sums over a rectangle of neighbouring windows. Written as loops, because closures in

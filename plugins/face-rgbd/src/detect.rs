@@ -61,12 +61,18 @@ impl FaceRgbd {
             if depth.is_some() {
                 proposals.for_side(camera, scale * cascade.width as f64, config);
             }
-            let propose = |window: &Rect| {
-                near.is_none_or(|upper_body| upper_body.contains(window.centre()))
-                    && (depth.is_none() || proposals.allows(window))
-            };
             let areas = if depth.is_some() { proposals.areas() } else { &everywhere };
-            scanner.scan_within(image, cascade, scale, areas, propose, hits);
+            scanner.scan_within(
+                image,
+                cascade,
+                scale,
+                areas,
+                |window| {
+                    near.is_none_or(|upper_body| upper_body.contains(window.centre()))
+                        && (depth.is_none() || proposals.allows(window))
+                },
+                hits,
+            );
         }
         let looked_at = scanner.looked_at() - before;
         funnel.drop_many("window: no face", looked_at - hits.len() as u64);

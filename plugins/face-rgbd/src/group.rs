@@ -94,9 +94,9 @@ impl Grouping {
         for Group { region, count, .. } in &mut self.groups {
             // As in OpenCV: in 32 bits, by the reciprocal, and halves to the even number.
             let part = 1.0 / *count as f32;
-            let mean = |sum: f64| f64::from((sum as f32 * part).round_ties_even());
-            let Rect { x, y, width, height } = *region;
-            *region = Rect::new(mean(x), mean(y), mean(width), mean(height));
+            let [x, y, width, height] = [region.x, region.y, region.width, region.height]
+                .map(|sum| f64::from((sum as f32 * part).round_ties_even()));
+            *region = Rect::new(x, y, width, height);
         }
     }
 }

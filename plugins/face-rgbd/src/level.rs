@@ -114,15 +114,13 @@ impl Level {
         }
         for y in 0..=height {
             for x in 0..=width {
-                let pixel = |up: usize| match (x.checked_sub(1), y.checked_sub(up)) {
-                    (Some(x), Some(y)) => u32::from(self.pixels[y * width + x]),
-                    _ => 0,
-                };
                 // Beside the image a diagonal meets what it meets at the border two rows above.
                 let left = if x == 0 { before[0] } else { above[x - 1] };
                 let right = if x == width { before[width] } else { above[x + 1] };
                 let upper = left.wrapping_add(right).wrapping_sub(before[x]);
-                row[x] = upper.wrapping_add(pixel(1)).wrapping_add(pixel(2));
+                row[x] = [1, 2].into_iter().fold(upper, |sum, up| {
+                    sum.wrapping_add(pixel_above(&self.pixels, width, [x, y], up))
+                });
             }
             for (x, sum) in row.iter().enumerate() {
                 let at = self.tilted_offset(x, y);
@@ -212,5 +210,14 @@ fn blend_columns(row: &[u32], columns: &[(usize, u32)], out: &mut [u8]) {
     for (pixel, &(x, right)) in out.iter_mut().zip(columns) {
         // Half of the divisor rounds to the nearest value.
         *pixel = ((row[x] * (256 - right) + row[x + 1] * right + 32768) >> 16) as u8;
+    }
+}
+
+/// Returns the pixel left of a corner and this many rows above it, 0 outside the image.
+#[inline]
+fn pixel_above(pixels: &[u8], width: usize, [x, y]: [usize; 2], up: usize) -> u32 {
+    match (x.checked_sub(1), y.checked_sub(up)) {
+        (Some(x), Some(y)) => u32::from(pixels[y * width + x]),
+        _ => 0,
     }
 }

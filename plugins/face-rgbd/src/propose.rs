@@ -140,26 +140,29 @@ impl Proposals {
     /// distance of a face of this size.
     pub fn for_side(&mut self, camera: &Camera, side: f64, config: &Config) {
         let Self { columns, rows, depth, searched, fitting, allowed, areas, .. } = self;
-        let metres = |at: &usize| side * f64::from(depth[*at]) / camera.focal_px();
-        let first = searched.partition_point(|at| metres(at) < config.min_face_m);
-        let end = searched.partition_point(|at| metres(at) <= config.max_face_m);
+        let columns = *columns;
+        let first =
+            searched.partition_point(|at| width_m(camera, side, depth[*at]) < config.min_face_m);
+        let end =
+            searched.partition_point(|at| width_m(camera, side, depth[*at]) <= config.max_face_m);
         fitting.clear();
         fitting.extend(searched.get(first..end).unwrap_or_default());
         allowed.clear();
         allowed.resize(depth.len(), false);
         for at in &*fitting {
-            let x = at % *columns;
-            let y = at / *columns;
+            let x = at % columns;
+            let y = at / columns;
             for row in y.saturating_sub(1)..(y + 2).min(*rows) {
-                let start = row * *columns;
-                allowed[start + x.saturating_sub(1)..start + (x + 2).min(*columns)].fill(true);
+                let start = row * columns;
+                allowed[start + x.saturating_sub(1)..start + (x + 2).min(columns)].fill(true);
             }
         }
         areas.clear();
-        let place = |at: &usize| [(at % *columns) as i64, (at / *columns) as i64];
         // Windows of islands at this distance share no pixels.
         let gap = (side / GRID_PX as f64).ceil() as i64 + 3;
-        islands(fitting, place, gap, &mut |island| areas.push(around(island.iter().map(place))));
+        islands(fitting, |at| place_of(*at, columns), gap, &mut |island| {
+            areas.push(around(island.iter().map(|at| place_of(*at, columns))));
+        });
     }
 
     /// Returns the areas that contain the centres of all windows that [`Proposals::allows`],
@@ -218,6 +221,18 @@ fn skin(image: &RgbImage, x: i64, y: i64) -> bool {
     })
 }
 
+/// Returns the width of something that is so many pixels wide at this depth, m.
+#[inline]
+fn width_m(camera: &Camera, side: f64, depth_m: f32) -> f64 {
+    side * f64::from(depth_m) / camera.focal_px()
+}
+
+/// Returns the column and the row of a point of the grid.
+#[inline]
+fn place_of(at: usize, columns: usize) -> [i64; 2] {
+    [(at % columns) as i64, (at / columns) as i64]
+}
+
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
@@ -255,14 +270,18 @@ mod tests {
         Block { columns, rows: 6..9, metres, is_skin }
     }
 
+    /// Returns the block that covers a pixel.
+    fn block_at(blocks: &[Block], x: usize, y: usize) -> Option<&Block> {
+        blocks
+            .iter()
+            .find(|b| b.columns.contains(&(x / GRID_PX)) && b.rows.contains(&(y / GRID_PX)))
+    }
+
     fn frame(blocks: &[Block]) -> Frame {
-        let at = |x: usize, y: usize| {
-            blocks
-                .iter()
-                .find(|b| b.columns.contains(&(x / GRID_PX)) && b.rows.contains(&(y / GRID_PX)))
-        };
-        let depth = DepthImage::from_fn(160, 120, |x, y| at(x, y).map_or(f32::NAN, |b| b.metres));
-        let colour = RgbImage::from_fn(160, 120, |x, y| match at(x, y) {
+        let depth = DepthImage::from_fn(160, 120, |x, y| {
+            block_at(blocks, x, y).map_or(f32::NAN, |block| block.metres)
+        });
+        let colour = RgbImage::from_fn(160, 120, |x, y| match block_at(blocks, x, y) {
             Some(block) if block.is_skin => SKIN,
             _ => [90, 90, 90],
         });
@@ -372,17 +391,16 @@ mod tests {
     #[test]
     fn points_are_possible_by_their_distance_and_height() {
         let config = Config { min_depth_m: 1.0, max_depth_m: 3.0, ..Config::default() };
-        let possible = |metres: f32, height_m: f64| {
+        let near_and_far = [(0.98, false), (1.02, true), (2.98, true), (3.02, false)]
+            .map(|(metres, is)| (metres, 1.3, is));
+        let low_and_high = [(0.75, false), (0.85, true), (2.05, true), (2.15, false)]
+            .map(|(height_m, is)| (2.0, height_m, is));
+        let unknown = [(f32::NAN, 1.3, false)];
+        for (metres, height_m, is) in near_and_far.into_iter().chain(low_and_high).chain(unknown) {
             let row = 59.5 - (height_m - 1.3) * FOCAL_PX / f64::from(metres);
-            is_possible(&camera(), 80, row.round() as i64, metres, &config)
-        };
-        for (metres, is) in [(0.98, false), (1.02, true), (2.98, true), (3.02, false)] {
-            assert_eq!(possible(metres, 1.3), is, "{metres} m away");
+            let found = is_possible(&camera(), 80, row.round() as i64, metres, &config);
+            assert_eq!(found, is, "{metres} m away, {height_m} m high");
         }
-        for (height_m, is) in [(0.75, false), (0.85, true), (2.05, true), (2.15, false)] {
-            assert_eq!(possible(2.0, height_m), is, "{height_m} m high");
-        }
-        assert!(!possible(f32::NAN, 1.3));
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! Scan of windows over an image in many sizes, as in OpenCV's `detectMultiScale`.
 
+use std::ops::Range;
+
 use tagalong_core::GreyImage;
 use tagalong_geometry::Rect;
 
@@ -72,15 +74,20 @@ impl Scanner {
         propose: impl Fn(&Rect) -> bool,
         hits: &mut Vec<Hit>,
     ) {
-        let size = |length: usize| rounded(length as f64 * scale);
-        let width = size(cascade.width);
-        let height = size(cascade.height);
-        let region = |x: usize, y: usize| Rect::new(size(x), size(y), width, height);
+        let size = [cascade.width, cascade.height].map(|length| rounded(length as f64 * scale));
         for area in areas {
-            self.size(image, cascade, scale, area, &|x, y| propose(&region(x, y)), &mut |seen| {
-                let region = region(seen.part.x + seen.x, seen.part.y + seen.y);
-                hits.push(Hit { region, margin: seen.margin });
-            });
+            self.size(
+                image,
+                cascade,
+                scale,
+                area,
+                &|x, y| propose(&scaled_region([x, y], scale, size)),
+                &mut |seen| {
+                    let at = [seen.part.x + seen.x, seen.part.y + seen.y];
+                    let region = scaled_region(at, scale, size);
+                    hits.push(Hit { region, margin: seen.margin });
+                },
+            );
         }
     }
 
@@ -99,16 +106,8 @@ impl Scanner {
         let step = if scale >= FINE_FROM { 1 } else { 2 };
         let size =
             [image.width(), image.height()].map(|length| rounded(length as f64 / scale) as usize);
-        let starts = |from: f64, to: f64, length: usize, window: usize| {
-            let half = 0.5 * rounded(window as f64 * scale);
-            let middle = |x: usize| rounded(x as f64 * scale) + half;
-            let all = (0..=length.checked_sub(window)?).step_by(step);
-            let mut inside = all.filter(|x| (from..to).contains(&middle(*x)));
-            let first = inside.next()?;
-            Some((first, inside.last().unwrap_or(first)))
-        };
-        let columns = starts(area.x, area.right(), size[0], cascade.width);
-        let rows = starts(area.y, area.bottom(), size[1], cascade.height);
+        let columns = starts(area.x..area.right(), size[0], cascade.width, scale, step);
+        let rows = starts(area.y..area.bottom(), size[1], cascade.height, scale, step);
         let (Some((left, right)), Some((top, bottom))) = (columns, rows) else { return };
         let part = Part {
             x: left,
@@ -134,6 +133,29 @@ impl Scanner {
             }
         }
     }
+}
+
+/// Returns the first and the last place, in pixels of the shrunk image, of a window along an axis
+/// of this length, with its middle in a range of the image.
+fn starts(
+    range: Range<f64>,
+    length: usize,
+    window: usize,
+    scale: f64,
+    step: usize,
+) -> Option<(usize, usize)> {
+    let half = 0.5 * rounded(window as f64 * scale);
+    let all = (0..=length.checked_sub(window)?).step_by(step);
+    let mut inside = all.filter(|x| range.contains(&(rounded(*x as f64 * scale) + half)));
+    let first = inside.next()?;
+    Some((first, inside.last().unwrap_or(first)))
+}
+
+/// Returns the region of the image of a window at this place, which has this size there.
+#[inline]
+fn scaled_region(at: [usize; 2], scale: f64, [width, height]: [f64; 2]) -> Rect {
+    let [x, y] = at.map(|length| rounded(length as f64 * scale));
+    Rect::new(x, y, width, height)
 }
 
 /// Rounds a value that is not negative to the nearest whole number. Called for each window, where

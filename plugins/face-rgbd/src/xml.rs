@@ -155,14 +155,8 @@ fn new_tree(tree: Element<'_, '_>, features: &[Feature]) -> XmlResult<Tree> {
     if words.is_empty() || words.len() % length != 0 {
         return Err("the nodes of one of its trees are incomplete".into());
     }
-    let next = |word: f64| match word as i64 {
-        to @ 1.. => Ok(Next::Node(to as usize)),
-        leaf => leaves
-            .get(leaf.unsigned_abs() as usize)
-            .map(|value| Next::Leaf(*value))
-            .ok_or_else(|| format!("one of its trees has no leaf {leaf}")),
-    };
-    let node = |words: &[f64]| {
+    let mut tree = Vec::new();
+    for words in words.chunks_exact(length) {
         let split = if is_binary {
             let mut bits = [0; 8];
             // OpenCV writes the bits as signed numbers.
@@ -171,9 +165,21 @@ fn new_tree(tree: Element<'_, '_>, features: &[Feature]) -> XmlResult<Tree> {
         } else {
             Split::Below(words[3] as f32)
         };
-        Ok(Node { feature: words[2] as usize, split, next: [next(words[0])?, next(words[1])?] })
-    };
-    words.chunks_exact(length).map(node).collect()
+        let next = [new_next(words[0], &leaves)?, new_next(words[1], &leaves)?];
+        tree.push(Node { feature: words[2] as usize, split, next });
+    }
+    Ok(tree)
+}
+
+/// Returns what follows a node by its number: a node if it is positive, else a leaf.
+fn new_next(word: f64, leaves: &[f32]) -> XmlResult<Next> {
+    match word as i64 {
+        to @ 1.. => Ok(Next::Node(to as usize)),
+        leaf => leaves
+            .get(leaf.unsigned_abs() as usize)
+            .map(|value| Next::Leaf(*value))
+            .ok_or_else(|| format!("one of its trees has no leaf {leaf}")),
+    }
 }
 
 fn feature(feature: Element<'_, '_>) -> XmlResult<Feature> {
@@ -209,26 +215,36 @@ fn old(root: Element<'_, '_>, size: Element<'_, '_>) -> XmlResult<Cascade> {
         return Err("its `size` is not two numbers".into());
     };
     let mut features = Vec::new();
-    let stage = |stage| {
+    let mut stages = Vec::new();
+    for stage in elements(wanted(root, "stages")?) {
         let threshold: f32 = number(stage, "stage_threshold")?;
-        let trees = elements(wanted(stage, "trees")?).map(|tree| old_tree(tree, &mut features));
-        Ok(Stage { trees: trees.collect::<XmlResult<_>>()?, threshold: threshold - SLACK })
-    };
-    let stages = elements(wanted(root, "stages")?).map(stage).collect::<XmlResult<_>>()?;
+        let mut trees = Vec::new();
+        for tree in elements(wanted(stage, "trees")?) {
+            trees.push(old_tree(tree, &mut features)?);
+        }
+        stages.push(Stage { trees, threshold: threshold - SLACK });
+    }
     Ok(Cascade { width, height, features, stages, calibration: None })
 }
 
+/// Reads a tree of the older format, whose nodes have features of their own.
 fn old_tree(tree: Element<'_, '_>, features: &mut Vec<Feature>) -> XmlResult<Tree> {
-    let mut node = |node: Element<'_, '_>| {
+    let mut nodes = Vec::new();
+    for node in elements(tree) {
         features.push(feature(wanted(node, "feature")?)?);
-        let next = |side: &str| match child(node, &format!("{side}_node")) {
-            Some(to) => Ok(Next::Node(parsed(to)?)),
-            None => Ok::<_, String>(Next::Leaf(number(node, &format!("{side}_val"))?)),
-        };
         let split = Split::Below(number(node, "threshold")?);
-        Ok(Node { feature: features.len() - 1, split, next: [next("left")?, next("right")?] })
-    };
-    elements(tree).map(&mut node).collect()
+        let next = [old_next(node, "left")?, old_next(node, "right")?];
+        nodes.push(Node { feature: features.len() - 1, split, next });
+    }
+    Ok(nodes)
+}
+
+/// Returns what follows a node on one side.
+fn old_next(node: Element<'_, '_>, side: &str) -> XmlResult<Next> {
+    match child(node, &format!("{side}_node")) {
+        Some(to) => Ok(Next::Node(parsed(to)?)),
+        None => Ok(Next::Leaf(number(node, &format!("{side}_val"))?)),
+    }
 }
 
 fn elements<'a, 'i>(of: Element<'a, 'i>) -> impl Iterator<Item = Element<'a, 'i>> {

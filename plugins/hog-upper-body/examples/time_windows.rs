@@ -8,10 +8,9 @@ use tagalong_hog_upper_body::{Grid, Model, Scanner, Wanted, merge, window_of};
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
-    let mut next = || arguments.next().expect("MODEL.toml PICTURE RUNS");
-    let model = next();
-    let picture = next();
-    let runs = next().parse::<usize>().expect("a number");
+    let [model, picture, runs] =
+        [(); 3].map(|()| arguments.next().expect("MODEL.toml PICTURE RUNS"));
+    let runs = runs.parse::<usize>().expect("a number");
     let text = std::fs::read_to_string(model).expect("the model can be read");
     let model = Model::from_text(&text).expect("it is a model");
     let image = image::open(picture).expect("the picture can be read").into_luma8();
@@ -28,16 +27,21 @@ fn main() {
         let least = model.sum_at(0.0);
         let sides = sides.take_while(|side| *side <= most);
         windows.clear();
-        let propose = |grid: &Grid, wanted: &mut Vec<Wanted>| {
-            wanted.extend(grid.windows(|square: &Rect| {
-                let window = window_of(square, model.coverage);
-                let is_inside = window.x.min(window.y) >= 0.0
-                    && window.right() <= width as f64
-                    && window.bottom() <= height as f64;
-                is_inside.then_some(None)
-            }))
-        };
-        scanner.scan(&image, sides, least, propose, &mut windows);
+        scanner.scan(
+            &image,
+            sides,
+            least,
+            |grid: &Grid, wanted: &mut Vec<Wanted>| {
+                wanted.extend(grid.windows(|square: &Rect| {
+                    let window = window_of(square, model.coverage);
+                    let is_inside = window.x.min(window.y) >= 0.0
+                        && window.right() <= width as f64
+                        && window.bottom() <= height as f64;
+                    is_inside.then_some(None)
+                }))
+            },
+            &mut windows,
+        );
         merge(&mut windows, model.coverage, 0.4, 0.4);
     }
     println!(

@@ -71,8 +71,8 @@ impl Channels {
             self.gradients.fill(rows, 0, lanes);
             add_row(&self.gradients, &rows[1][1..], &mut self.columns_of);
         }
-        let of = |x: usize| (y * self.columns + HALVES * x) * DEPTH;
-        let row = &mut self.values[of(span.start)..of(span.end)];
+        let [from, to] = [span.start, span.end].map(|x| (y * self.columns + HALVES * x) * DEPTH);
+        let row = &mut self.values[from..to];
         sum_columns(&self.columns_of, row);
     }
 

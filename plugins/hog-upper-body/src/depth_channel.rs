@@ -75,20 +75,26 @@ impl DepthTrees {
 pub(crate) fn depth_numbers(depth: &DepthImage, square: &Rect, surface_m: f64) -> Vec<f32> {
     let window = window_of(square, Coverage::UpperBody);
     let step = window.width / (CELLS * TAPS) as f64;
-    let at = |from: f64, tap: usize| (from + (tap as f64 + 0.5) * step).floor() as i64;
-    let reading = |x: usize, y: usize| depth.get(at(window.x, x), at(window.y, y));
-    let cell = |column: usize, row: usize| {
-        let taps = (0..TAPS * TAPS).map(|k| (TAPS * column + k % TAPS, TAPS * row + k / TAPS));
-        // Cameras write 0 where they measured nothing.
-        let measured = taps.filter_map(|(x, y)| reading(x, y)).filter(|metres| *metres > 0.0);
-        let nearest = measured.fold(f32::INFINITY, f32::min);
-        if nearest.is_finite() {
+    let mut numbers = Vec::with_capacity(DEPTH_NUMBERS);
+    for cell in 0..DEPTH_NUMBERS {
+        let mut nearest = f32::INFINITY;
+        for k in 0..TAPS * TAPS {
+            let column = TAPS * (cell % CELLS) + k % TAPS;
+            let row = TAPS * (cell / CELLS) + k / TAPS;
+            let [x, y] = [(window.x, column), (window.y, row)]
+                .map(|(from, tap)| (from + (tap as f64 + 0.5) * step).floor() as i64);
+            // Cameras write 0 where they measured nothing.
+            if let Some(metres) = depth.get(x, y).filter(|metres| *metres > 0.0) {
+                nearest = nearest.min(metres);
+            }
+        }
+        numbers.push(if nearest.is_finite() {
             (f64::from(nearest) - surface_m).clamp(-MOST_M, MOST_M) as f32
         } else {
             MISSING
-        }
-    };
-    (0..DEPTH_NUMBERS).map(|k| cell(k % CELLS, k / CELLS)).collect()
+        });
+    }
+    numbers
 }
 
 #[cfg(test)]

@@ -162,9 +162,10 @@ impl<'a> Proposer<'a> {
     /// Returns true if the object has no upper end here: walls, trunks of people, furniture.
     fn goes_on_above(&self, depth: &DepthImage, square: &Rect, face_m: f64) -> bool {
         let y = (square.y - ABOVE * square.height) as i64;
-        let column = |i: usize| (square.x + square.width * (0.25 + 0.125 * i as f64)) as i64;
-        (0..TAPS)
-            .filter_map(|i| depth.get(column(i), y))
+        let columns =
+            (0..TAPS).map(|i| (square.x + square.width * (0.25 + 0.125 * i as f64)) as i64);
+        columns
+            .filter_map(|x| depth.get(x, y))
             .filter(|m| (f64::from(*m) - face_m).abs() < self.config.above_m)
             .count()
             > TAPS / 2
@@ -249,8 +250,8 @@ mod tests {
     fn is_head(depth: impl Fn(f64) -> f32) -> (bool, u64) {
         let camera = camera();
         let square = camera.upper_body(&Point3::new(3.0, 0.0, 1.5));
-        let above = |y: usize| (square.y - y as f64) / square.height;
-        let depth = DepthImage::from_fn(640, 480, |_, y| depth(above(y)));
+        let depth =
+            DepthImage::from_fn(640, 480, |_, y| depth((square.y - y as f64) / square.height));
         let config = Config::default();
         let mut lattice = Lattice::default();
         let mut proposer = Proposer::new(&config, &camera, Some(&depth), &mut lattice, None);
@@ -269,13 +270,13 @@ mod tests {
             Config { min_side_px: 40.0, max_side: 0.5, scale_step: 1.5, ..Config::default() };
         let all: Vec<f64> = sides(&config, &camera(), None).collect();
         assert_eq!(all, [40.0, 60.0, 90.0, 135.0, 202.5], "up to half of 480 pixels");
-        let near = |width: f64| {
-            let expected = Rect::new(10.0, 10.0, width, width);
-            sides(&config, &camera(), Some(expected)).collect::<Vec<f64>>()
-        };
-        assert_eq!(near(65.0), [60.0, 90.0], "from 45.5 to 91");
-        assert_eq!(near(150.0), [135.0, 202.5]);
-        assert_eq!(near(20.0), [0.0; 0]);
+        // From 45.5 to 91, and so on.
+        for (width, expected) in [(65.0, &[60.0, 90.0][..]), (150.0, &[135.0, 202.5]), (20.0, &[])]
+        {
+            let region = Rect::new(10.0, 10.0, width, width);
+            let found: Vec<f64> = sides(&config, &camera(), Some(region)).collect();
+            assert_eq!(found, expected, "{width}");
+        }
     }
 
     #[test]
@@ -283,17 +284,21 @@ mod tests {
         let config = Config::default();
         let camera = camera();
         let expected = Rect::new(100.0, 100.0, 60.0, 60.0);
-        let is_near = |near: Option<Rect>, dx: f64, dy: f64| {
+        for (near, dx, dy, expected) in [
+            (Some(expected), 29.0, 0.0, true),
+            (Some(expected), 0.0, -29.0, true),
+            (Some(expected), 31.0, 0.0, false),
+            // Round, not square.
+            (Some(expected), 25.0, 25.0, false),
+            // Everything is near where nobody is expected.
+            (None, 400.0, 0.0, true),
+        ] {
             let mut lattice = Lattice::default();
             let proposer = Proposer::new(&config, &camera, None, &mut lattice, near);
             // A smaller square with the same middle, moved.
-            proposer.is_near(&Rect::new(110.0 + dx, 110.0 + dy, 40.0, 40.0))
-        };
-        for (dx, dy, is) in [(29.0, 0.0, true), (0.0, -29.0, true), (31.0, 0.0, false)] {
-            assert_eq!(is_near(Some(expected), dx, dy), is, "{dx} {dy}");
+            let square = Rect::new(110.0 + dx, 110.0 + dy, 40.0, 40.0);
+            assert_eq!(proposer.is_near(&square), expected, "{dx} {dy}");
         }
-        assert!(!is_near(Some(expected), 25.0, 25.0), "round, not square");
-        assert!(is_near(None, 400.0, 0.0), "everything is near where nobody is expected");
     }
 
     #[test]
@@ -303,14 +308,15 @@ mod tests {
         let depth = DepthImage::filled(640, 480, f32::NAN);
         let mut lattice = Lattice::default();
         let mut proposer = Proposer::new(&config, &camera, Some(&depth), &mut lattice, None);
-        let mut is_head = |height_m: f64| {
+        let [low, high] = [config.min_head_height_m, config.max_head_height_m];
+        for (height_m, expected) in
+            [(low - 0.05, false), (low + 0.05, true), (high - 0.05, true), (high + 0.05, false)]
+        {
             let head = Point3::new(4.0, 0.0, height_m);
             let face_m = camera.depth_of(&head) - HEAD_RADIUS_M;
-            proposer.is_head(&depth, &camera.upper_body(&head), face_m)
-        };
-        let [low, high] = [config.min_head_height_m, config.max_head_height_m];
-        let heights = [low - 0.05, low + 0.05, high - 0.05, high + 0.05];
-        assert_eq!(heights.map(&mut is_head), [false, true, true, false]);
+            let is_head = proposer.is_head(&depth, &camera.upper_body(&head), face_m);
+            assert_eq!(is_head, expected, "{height_m}");
+        }
         assert_eq!((proposer.out_of_place, proposer.goes_on, proposer.unfit), (2, 0, 0));
     }
 
@@ -328,9 +334,10 @@ mod tests {
         let side = 525.0 * UPPER_BODY_SIDE_M / 4.0;
         let region = Rect::new(319.5 - 0.5 * side, 239.5 - 0.5 * side, side, side);
         let sum = detector.model.sum_at(1.0);
-        let window = |depth_m| Window { region, depth_m, sum };
-        let by_depth = detector.detection(&camera, &window(Some(3.0))).unwrap();
-        let by_size = detector.detection(&camera, &window(None)).unwrap();
+        let flat = Window { region, depth_m: None, sum };
+        let deep = Window { depth_m: Some(3.0), ..flat };
+        let by_depth = detector.detection(&camera, &deep).unwrap();
+        let by_size = detector.detection(&camera, &flat).unwrap();
         for (found, face_m, sigma_m) in
             [(&by_depth, 3.0, config.sigma_depth_m), (&by_size, 4.0, 4.0 * config.sigma_distance)]
         {
@@ -340,7 +347,7 @@ mod tests {
             assert!((found.covariance[(1, 1)].sqrt() / aside - 1.0).abs() < 0.02);
             assert!((found.score - 1.0).abs() < 1e-4 && found.rect().unwrap() == region);
         }
-        let sure = Window { sum: detector.model.sum_at(99.0), ..window(None) };
+        let sure = Window { sum: detector.model.sum_at(99.0), ..flat };
         assert_eq!(detector.detection(&camera, &sure).unwrap().score, config.max_score);
     }
 
@@ -360,8 +367,8 @@ mod tests {
         let query = near.map_or(Query::Discover { occupied: &[] }, Query::Track);
         let mut funnel = Funnel::default();
         let found = detector(config).detect(&frame, &query, &mut funnel).unwrap();
-        let count = |test: &str| funnel.count(test);
-        ([count("window: size and depth"), count("window: gradients")], found.len())
+        let counts = ["window: size and depth", "window: gradients"].map(|test| funnel.count(test));
+        (counts, found.len())
     }
 
     #[test]
@@ -404,8 +411,23 @@ mod tests {
         let camera = camera();
         let config = Config::default();
         let square = camera.upper_body(&Point3::new(3.0, 0.0, 1.5));
+        let all = [-9.0, 9.0];
         // The object between two columns and two rows, in sides of the square; the rest is far.
-        let goes_on = |columns: [f64; 2], above: [f64; 2]| {
+        for (columns, above, expected) in [
+            // Read at 0.25, 0.375, 0.5, 0.625 and 0.75 of the width: three of five are most.
+            ([0.2, 0.53], all, true),
+            ([0.2, 0.47], all, false),
+            ([0.47, 0.8], all, true),
+            ([0.53, 0.8], all, false),
+            ([0.3, 0.59], all, false),
+            ([0.35, 0.65], all, true),
+            ([-9.0, 0.22], all, false),
+            ([0.78, 9.0], all, false),
+            // A quarter of the square above it.
+            (all, [0.22, 0.28], true),
+            (all, [-9.0, 0.22], false),
+            (all, [0.28, 9.0], false),
+        ] {
             let depth = DepthImage::from_fn(640, 480, |x, y| {
                 let x = (x as f64 + 0.5 - square.x) / square.width;
                 let y = (square.y - y as f64 - 0.5) / square.height;
@@ -414,17 +436,9 @@ mod tests {
             });
             let mut lattice = Lattice::default();
             let proposer = Proposer::new(&config, &camera, Some(&depth), &mut lattice, None);
-            proposer.goes_on_above(&depth, &square, 2.9)
-        };
-        let all = [-9.0, 9.0];
-        // Read at 0.25, 0.375, 0.5, 0.625 and 0.75 of the width: three of five are most.
-        assert!(goes_on([0.2, 0.53], all) && !goes_on([0.2, 0.47], all));
-        assert!(goes_on([0.47, 0.8], all) && !goes_on([0.53, 0.8], all));
-        assert!(!goes_on([0.3, 0.59], all) && goes_on([0.35, 0.65], all));
-        assert!(!goes_on([-9.0, 0.22], all) && !goes_on([0.78, 9.0], all));
-        // A quarter of the square above it.
-        assert!(goes_on(all, [0.22, 0.28]));
-        assert!(!goes_on(all, [-9.0, 0.22]) && !goes_on(all, [0.28, 9.0]));
+            let goes_on = proposer.goes_on_above(&depth, &square, 2.9);
+            assert_eq!(goes_on, expected, "{columns:?} {above:?}");
+        }
     }
 
     /// Returns true if windows with a square of `side` pixels are proposed before a wall.
@@ -454,12 +468,21 @@ mod tests {
             ..Config::default()
         };
         let side = 525.0 * UPPER_BODY_SIDE_M / 3.0;
-        let near = |metres: f64| is_proposed(&config, side, metres);
-        assert!(near(3.0) && near(2.42) && near(3.74));
-        assert!(!near(2.38) && !near(3.76));
         let narrow = Config { min_depth_m: 2.8, max_depth_m: 3.2, ..config.clone() };
-        let near = |metres: f64| is_proposed(&narrow, side, metres);
-        assert!(near(2.81) && near(3.19) && !near(2.79) && !near(3.21));
-        assert!(is_proposed(&config, 2.0 * side, 1.5) && !is_proposed(&config, 2.0 * side, 3.0));
+        for (config, side, metres, expected) in [
+            (&config, side, 3.0, true),
+            (&config, side, 2.42, true),
+            (&config, side, 3.74, true),
+            (&config, side, 2.38, false),
+            (&config, side, 3.76, false),
+            (&narrow, side, 2.81, true),
+            (&narrow, side, 3.19, true),
+            (&narrow, side, 2.79, false),
+            (&narrow, side, 3.21, false),
+            (&config, 2.0 * side, 1.5, true),
+            (&config, 2.0 * side, 3.0, false),
+        ] {
+            assert_eq!(is_proposed(config, side, metres), expected, "{side} {metres}");
+        }
     }
 }

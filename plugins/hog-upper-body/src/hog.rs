@@ -50,8 +50,9 @@ impl Blocks {
         for (y, rows) in spans.cells().windows(2).enumerate() {
             let start = rows[0].start.max(rows[1].start);
             let end = rows[0].end.min(rows[1].end);
-            let cells = |y: usize| self.cells.get(y * across + start..y * across + end);
-            if let (Some(above), Some(below)) = (cells(y), cells(y + 1)) {
+            let [above, below] =
+                [y, y + 1].map(|y| self.cells.get(y * across + start..y * across + end));
+            if let (Some(above), Some(below)) = (above, below) {
                 let blocks = &mut self.values[y * self.columns + start..];
                 normalise(above, below, blocks);
             }

@@ -115,13 +115,14 @@ impl Forest {
         self.channels.planes(&mut self.planes);
         // Places depend on the layout only, which rarely changes from one image to the next.
         if self.layout != self.planes.layout() {
-            let place = |number: u16| {
-                let cell = usize::from(number) / DEPTH;
-                let k = usize::from(number) % DEPTH;
-                self.planes.place(cell % CELLS, cell / CELLS, k) as u32
-            };
             self.places.clear();
-            self.places.extend(self.trees.trees.iter().map(|tree| tree.numbers.map(place)));
+            for tree in &self.trees.trees {
+                self.places.push(tree.numbers.map(|number| {
+                    let cell = usize::from(number) / DEPTH;
+                    let k = usize::from(number) % DEPTH;
+                    self.planes.place(cell % CELLS, cell / CELLS, k) as u32
+                }));
+            }
             self.layout = self.planes.layout();
         }
     }

@@ -27,19 +27,19 @@ impl Taps {
             let centre = origin + (i as f64 + 0.5) * step - 0.5;
             let start = (centre - reach).ceil() as i64;
             let end = (centre + reach).floor() as i64;
-            let weight = |x: i64| (1.0 - (x as f64 - centre).abs() / reach).max(0.0);
-            let total: f64 = (start..=end).map(weight).sum();
+            let weights = (start..=end).map(|x| (1.0 - (x as f64 - centre).abs() / reach).max(0.0));
+            let total: f64 = weights.clone().sum();
             self.starts.push((start, self.weights.len()));
-            self.weights.extend((start..=end).map(|x| (weight(x) / total) as f32));
+            self.weights.extend(weights.map(|weight| (weight / total) as f32));
         }
     }
 
     /// Returns the first source pixel of some samples, and the weights from there on.
     fn of(&self, samples: Range<usize>) -> impl Iterator<Item = (i64, &[f32])> {
-        let end = |sample: usize| self.starts.get(sample + 1).map(|(_, from)| *from);
-        samples.map(move |sample| {
+        samples.map(|sample| {
             let (start, from) = self.starts[sample];
-            (start, &self.weights[from..end(sample).unwrap_or(self.weights.len())])
+            let next = self.starts.get(sample + 1);
+            (start, &self.weights[from..next.map_or(self.weights.len(), |(_, from)| *from)])
         })
     }
 

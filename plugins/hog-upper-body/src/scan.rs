@@ -127,8 +127,9 @@ impl Scanner {
         let down = (bottom - top) as usize + tall;
         let places = wanted.iter().map(|w| ((w.x - left) as usize, (w.y - top) as usize));
         self.spans.fill(places, (wide, tall), down);
-        let start = |cell: i64| ((cell * CELL as i64) as f64 - around_px as f64) * step;
-        let origin = (start(left), start(top));
+        let [x, y] =
+            [left, top].map(|cell| ((cell * CELL as i64) as f64 - around_px as f64) * step);
+        let origin = (x, y);
         let size = [across, down].map(|n| n * CELL + 2);
         let size = (size[0], size[1]);
         let spans = &self.spans;
@@ -145,11 +146,12 @@ impl Scanner {
         least: f32,
         found: &mut Vec<Window>,
     ) {
-        let at = |cell: i64, first: i64| (cell - first) as usize + around(self.layout.kind);
         for run in wanted.chunk_by(|a, b| (a.x + 1, a.y) == (b.x, b.y)) {
             self.sums.clear();
             self.sums.resize(run.len(), 0.0);
-            self.judge.sums((at(run[0].x, left), at(run[0].y, top)), &mut self.sums);
+            let [x, y] = [run[0].x - left, run[0].y - top]
+                .map(|cell| cell as usize + around(self.layout.kind));
+            self.judge.sums((x, y), &mut self.sums);
             let good = run.iter().zip(&self.sums).filter(|(_, sum)| **sum >= least);
             found.extend(good.map(|(window, sum)| Window {
                 region: grid.square(window.x, window.y),
@@ -186,8 +188,9 @@ impl Grid {
     /// Returns the upper-body square of the window that begins at a cell.
     pub fn square(&self, x: i64, y: i64) -> Rect {
         let (left_px, above_px) = margins();
-        let at = |cell: i64, margin: f64| ((cell * CELL as i64) as f64 + margin) * self.step;
-        Rect::new(at(x, left_px), at(y, above_px), self.side, self.side)
+        let [left, top] = [(x, left_px), (y, above_px)]
+            .map(|(cell, margin)| ((cell * CELL as i64) as f64 + margin) * self.step);
+        Rect::new(left, top, self.side, self.side)
     }
 
     /// Returns the windows that `ask` allows, row by row; it is given the square, and returns the
@@ -243,15 +246,15 @@ pub fn merge(windows: &mut Vec<Window>, coverage: Coverage, overlap: f64, apart_
     let mut kept = 0;
     for at in 0..windows.len() {
         let window = windows[at];
-        let is_same = |better: &Window| {
+        let is_same = windows[..kept].iter().any(|better| {
             let apart = match (window.depth_m, better.depth_m) {
                 (Some(a), Some(b)) => (a - b).abs() >= apart_m,
                 _ => false,
             };
             !apart
                 && coverage.person(&window.region).iou(&coverage.person(&better.region)) > overlap
-        };
-        if !windows[..kept].iter().any(is_same) {
+        });
+        if !is_same {
             windows[kept] = window;
             kept += 1;
         }

@@ -42,12 +42,13 @@ fn slow_cell(pixels: &[f32], width: usize, cell: (usize, usize)) -> [f32; BINS] 
     }
 
     let height = pixels.len() / width;
-    let root = |x: usize, y: usize| pixels[y * width + x].sqrt();
+    let roots: Vec<f32> = pixels.iter().map(|v| v.sqrt()).collect();
     let mut histogram = [0.0; BINS];
     for y in 1..height - 1 {
         for x in 1..width - 1 {
-            let gx = root(x + 1, y) - root(x - 1, y);
-            let gy = root(x, y + 1) - root(x, y - 1);
+            let at = y * width + x;
+            let gx = roots[at + 1] - roots[at - 1];
+            let gy = roots[at + width] - roots[at - width];
             let share = near(away(x, cell.0)) * near(away(y, cell.1));
             let angle = gy.atan2(gx).rem_euclid(std::f32::consts::PI);
             for (bin, sum) in histogram.iter_mut().enumerate() {
@@ -94,10 +95,15 @@ fn scan(
 ) -> Vec<Window> {
     let sides = sides.iter().copied();
     let mut found = Vec::new();
-    let propose = |grid: &Grid, wanted: &mut Vec<Wanted>| {
-        wanted.extend(grid.windows(|square| part(square).then_some(None)));
-    };
-    scanner.scan(image, sides, f32::NEG_INFINITY, propose, &mut found);
+    scanner.scan(
+        image,
+        sides,
+        f32::NEG_INFINITY,
+        |grid: &Grid, wanted: &mut Vec<Wanted>| {
+            wanted.extend(grid.windows(|square| part(square).then_some(None)));
+        },
+        &mut found,
+    );
     found
 }
 
@@ -120,12 +126,13 @@ fn trees() -> Model {
 }
 
 fn trees_of(coverage: Coverage) -> Model {
-    let tree = |k: usize| Tree {
-        numbers: [k * 131, k * 57 + 9, k * 733 + 1].map(|n| (n % channel_numbers(coverage)) as u16),
+    let most = channel_numbers(coverage);
+    let trees = (1..30).map(|k| Tree {
+        numbers: [k * 131, k * 57 + 9, k * 733 + 1].map(|n| (n % most) as u16),
         below: [0.5, 0.12, 0.3],
         values: [0.25, -0.5, 1.0, -0.125],
-    };
-    let trees = Trees::new((1..30).map(tree).collect(), -11.0);
+    });
+    let trees = Trees::new(trees.collect(), -11.0);
     Model { machine: Machine::Trees(trees), coverage, slope: 1.0, offset: 0.0, depth: None }
 }
 
@@ -138,16 +145,16 @@ fn a_scan_gives_each_window_the_sum_of_its_numbers() {
         assert_eq!(scanner.looked_at(), windows.len() as u64);
         assert!(windows.len() > 100, "{}", windows.len());
         // At the edge of the resampled part, cells have other neighbours.
-        let inner = |w: &&Window| {
-            let r = crate::window_of(&w.region, model.coverage);
+        let mut inner = windows.clone();
+        inner.retain(|window| {
+            let r = crate::window_of(&window.region, model.coverage);
             r.x > 0.0 && r.y > 0.0 && r.right() < 160.0 && r.bottom() < 130.0
-        };
-        let differs = |window: &&Window| {
+        });
+        let different = inner.iter().filter(|window| {
             let numbers = window_numbers(&image, &window.region, model.layout());
             !same(window.sum, model.sum_of(&numbers), 2e-2)
-        };
-        let inner: Vec<&Window> = windows.iter().filter(inner).collect();
-        let different = inner.iter().filter(|w| differs(w)).count();
+        });
+        let different = different.count();
         // A value may lie so close to its threshold that the two ways differ.
         assert!(inner.len() > 20 && different * 50 <= inner.len(), "{different}");
         let given_up = inner.iter().filter(|w| w.sum == f32::NEG_INFINITY).count();
@@ -161,15 +168,16 @@ fn slow_channels(pixels: &[f32], width: usize, cell: (usize, usize)) -> [f32; DE
     let bins = DEPTH - 2;
     let mut numbers = [0.0; DEPTH];
     let count = (channels::CELL * channels::CELL) as f32;
+    let pixels: Vec<f32> = pixels.iter().map(|v| v / 255.0).collect();
     for y in 1 + cell.1 * channels::CELL..1 + (cell.1 + 1) * channels::CELL {
         for x in 1 + cell.0 * channels::CELL..1 + (cell.0 + 1) * channels::CELL {
-            let at = |x: usize, y: usize| pixels[y * width + x] / 255.0;
-            let gx = (at(x + 1, y) - at(x - 1, y)) / 2.0;
-            let gy = (at(x, y + 1) - at(x, y - 1)) / 2.0;
+            let at = y * width + x;
+            let gx = (pixels[at + 1] - pixels[at - 1]) / 2.0;
+            let gy = (pixels[at + width] - pixels[at - width]) / 2.0;
             let length = gx.hypot(gy);
             let angle = gy.atan2(gx).rem_euclid(std::f32::consts::PI);
             let at_bin = angle / std::f32::consts::PI * bins as f32;
-            numbers[0] += at(x, y) / count;
+            numbers[0] += pixels[at] / count;
             numbers[1] += length / count;
             for bin in 0..bins {
                 let off = (at_bin - bin as f32).abs();
@@ -181,38 +189,46 @@ fn slow_channels(pixels: &[f32], width: usize, cell: (usize, usize)) -> [f32; DE
     numbers
 }
 
+/// The weighted mean of a number of the cells around a cell, over those that exist.
+fn mean_around(
+    [x, y]: [i64; 2],
+    [columns, rows]: [i64; 2],
+    weights: &[f32],
+    number: &dyn Fn(i64, i64) -> f32,
+) -> f32 {
+    let reach = weights.len() as i64 / 2;
+    let mut sum = 0.0;
+    let mut total = 0.0;
+    for (y, v) in (y - reach..).zip(weights) {
+        for (x, w) in (x - reach..).zip(weights) {
+            if (0..columns).contains(&x) && (0..rows).contains(&y) {
+                sum += v * w * number(x, y);
+                total += v * w;
+            }
+        }
+    }
+    sum / total
+}
+
 #[test]
 fn channels_are_those_of_the_slow_reference() {
     let image = noise(50, 42, 21);
     let pixels: Vec<f32> = image.pixels().iter().map(|v| f32::from(*v)).collect();
     let mut channels = Channels::default();
     channels.fill(&pixels, 50, &Spans::whole(50, 42));
-    let columns = 12_i64;
-    let rows = 10_i64;
-    let cell = |x: i64, y: i64| slow_channels(&pixels, 50, (x as usize, y as usize));
-    let inside = |x: i64, y: i64| (0..columns).contains(&x) && (0..rows).contains(&y);
-    // Weighted mean over the existing cells around a cell.
-    let mean = |x: i64, y: i64, weights: &[f32], number: &dyn Fn(i64, i64) -> f32| {
-        let reach = weights.len() as i64 / 2;
-        let mut sum = 0.0;
-        let mut total = 0.0;
-        for (dy, v) in (-reach..).zip(weights) {
-            for (dx, w) in (-reach..).zip(weights) {
-                if inside(x + dx, y + dy) {
-                    sum += v * w * number(x + dx, y + dy);
-                    total += v * w;
-                }
-            }
-        }
-        sum / total
-    };
-    let compared = |x: i64, y: i64, k: usize| {
-        let around = mean(x, y, &[1.0, 2.0, 3.0, 2.0, 1.0], &|x, y| cell(x, y)[1]);
-        cell(x, y)[k] / if k == 0 { 1.0 } else { around + 0.005 }
-    };
+    let size = [12, 10];
+    let cells: Vec<[f32; DEPTH]> =
+        (0..120).map(|k| slow_channels(&pixels, 50, (k % 12, k / 12))).collect();
     for (x, y) in [(0, 0), (5, 4), (11, 9), (3, 0)] {
         for k in 0..DEPTH {
-            let slow = mean(x, y, &[1.0, 2.0, 1.0], &|x, y| compared(x, y, k));
+            let slow = mean_around([x, y], size, &[1.0, 2.0, 1.0], &|x, y| {
+                let weights = [1.0, 2.0, 3.0, 2.0, 1.0];
+                let around = mean_around([x, y], size, &weights, &|x, y| {
+                    cells[(y * size[0] + x) as usize][1]
+                });
+                let own = cells[(y * size[0] + x) as usize][k];
+                own / if k == 0 { 1.0 } else { around + 0.005 }
+            });
             let fast = channels.from(x as usize, y as usize)[k];
             assert!((fast - slow).abs() < 1e-3, "({x}, {y}) {k}: {fast} {slow}");
         }
@@ -264,12 +280,22 @@ fn a_model_survives_its_file_and_a_wrong_one_is_refused() {
     let text = model.to_text().unwrap();
     assert_eq!(Model::from_text(&text).unwrap(), model);
     assert!((model.log_odds(model.sum_at(0.5)) - 0.5).abs() < 1e-5);
-    let wrong = |from: &str, to: &str| Model::from_text(&text.replace(from, to)).unwrap_err();
-    assert!(wrong("hog-upper-body 3", "hog 9").contains("format"));
-    assert!(wrong("slope = 2.5", "slope = -2.5").contains("slope"));
-    assert!(wrong("\"linear\"", "\"trees\"").contains("trees"));
+    for (from, to, why) in [
+        ("hog-upper-body 3", "hog 9", "format"),
+        ("slope = 2.5", "slope = -2.5", "slope"),
+        ("\"linear\"", "\"trees\"", "trees"),
+    ] {
+        let refusal = Model::from_text(&text.replace(from, to)).unwrap_err();
+        assert!(refusal.contains(why), "{refusal}");
+    }
     assert!(Model::from_text("nonsense").is_err());
     assert_eq!(WINDOW_PX, (SIDE + 1) * CELL);
+}
+
+/// Whether a square lies in a slanted stripe of some width, and there in one of `every` columns.
+fn is_in_stripe(square: &Rect, slope: f64, width: f64, every: usize) -> bool {
+    let across = square.x - 80.0 - slope * (square.y - 40.0);
+    across.abs() < width && ((square.x / 10.0) as usize).is_multiple_of(every)
 }
 
 proptest! {
@@ -285,17 +311,13 @@ proptest! {
             }
 
         let image = noise(200, 150, 4);
-        let part = |square: &Rect| {
-            let across = square.x - 80.0 - slope * (square.y - 40.0);
-            across.abs() < width && ((square.x / 10.0) as usize).is_multiple_of(every)
-        };
+        let sides = [40.0, 52.0];
         for model in [linear(), trees(), trees_of(Coverage::WholeBody)] {
-            let scan = |part: &dyn Fn(&Rect) -> bool| {
-                scan(&mut Scanner::new(&model), &image, &[40.0, 52.0], part)
-            };
-            let mut all = scan(&|_| true);
-            all.retain(|window| part(&window.region));
-            let mut some = scan(&part);
+            let mut all = scan(&mut Scanner::new(&model), &image, &sides, |_| true);
+            all.retain(|window| is_in_stripe(&window.region, slope, width, every));
+            let mut some = scan(&mut Scanner::new(&model), &image, &sides, |square| {
+                is_in_stripe(square, slope, width, every)
+            });
             all.sort_by_key(order);
             some.sort_by_key(order);
             prop_assert_eq!(all.len(), some.len());
@@ -330,9 +352,9 @@ fn slow_sample(image: &GreyImage, (x, y): (f64, f64), step: f64) -> f64 {
     let mut total = 0.0;
     for row in -60..160_i64 {
         for column in -60..160_i64 {
-            let near =
-                |at: i64, centre: f64| (1.0 - (at as f64 + 0.5 - centre).abs() / reach).max(0.0);
-            let weight = near(column, x) * near(row, y);
+            let [across, down] = [(column, x), (row, y)]
+                .map(|(at, centre)| (1.0 - (at as f64 + 0.5 - centre).abs() / reach).max(0.0));
+            let weight = across * down;
             let right = image.width() as i64 - 1;
             let bottom = image.height() as i64 - 1;
             let value = image.row(row.clamp(0, bottom) as usize)[column.clamp(0, right) as usize];
@@ -364,11 +386,8 @@ proptest! {
         width in 80..200usize, height in 80..200usize, side in 16.0..60.0f64,
     ) {
         let grid = Grid::new((width, height), side);
-        let is_inside = |square: &Rect| {
-            let right = width as f64 + 1e-9;
-            let bottom = height as f64 + 1e-9;
-            square.x > -1e-9 && square.y > -1e-9 && square.right() < right && square.bottom() < bottom
-        };
+        let right = width as f64 + 1e-9;
+        let bottom = height as f64 + 1e-9;
         let columns = grid.columns.clone();
         let rows = grid.rows.clone();
         for (x, y, is) in [
@@ -380,7 +399,9 @@ proptest! {
             (columns.start, rows.end, false),
         ] {
             let square = grid.square(x, y);
-            prop_assert_eq!(is_inside(&square), is, "{} {}: {:?}", x, y, square);
+            let starts_inside = square.x > -1e-9 && square.y > -1e-9;
+            let is_inside = starts_inside && square.right() < right && square.bottom() < bottom;
+            prop_assert_eq!(is_inside, is, "{} {}: {:?}", x, y, square);
             prop_assert_eq!((square.width, square.height), (side, side));
             // The window begins at its cell, of 8 pixels of the resampled image.
             let window = crate::window_of(&square, Coverage::UpperBody);
@@ -454,6 +475,11 @@ mod training {
         trainer
     }
 
+    /// Returns a count among some figures.
+    fn count_of(figures: &toml::Table, key: &str) -> i64 {
+        figures[key].as_integer().expect("an integer")
+    }
+
     #[test]
     fn both_machines_learn_to_tell_heads_from_bars() {
         for kind in [Kind::Linear, Kind::Trees] {
@@ -461,28 +487,26 @@ mod training {
             let fitted = trainer(kind).fit(&mut |part| parts.push(part)).unwrap();
             assert!(parts.is_sorted() && parts.last() == Some(&1.0), "{parts:?}");
             let figures = &fitted.figures;
-            let count = |key: &str| figures[key].as_integer().unwrap();
-            let part = |key: &str| figures[key].as_float().unwrap();
             // Eight windows of each person that is fitted; a tenth and a fifth are held out.
-            let people = count("windows_of_people");
+            let people = count_of(figures, "windows_of_people");
             assert!(people % 8 == 0 && (8 * 22..8 * 35).contains(&people), "{figures}");
             // One window of each small picture of the same groups, and the mined ones.
             let mined = figures["mined"].as_array().unwrap()[0].as_integer().unwrap();
-            assert_eq!(count("windows_of_others"), people / 8 + mined);
+            assert_eq!(count_of(figures, "windows_of_others"), people / 8 + mined);
             assert!(mined <= 5 * people / 8, "{figures}");
-            assert_eq!((count("pictures_without_people"), count("people_cut_off")), (40, 1));
-            assert!((1..18).contains(&count("held_out_people")), "{figures}");
-            assert!(count("held_out_windows_of_others") > 100, "{figures}");
-            assert!(part("held_out_people_accepted") > 0.9, "{figures}");
-            assert!((0.5..=1.0).contains(&part("area_under_roc_of_near_misses")), "{figures}");
+            assert_eq!(count_of(figures, "pictures_without_people"), 40);
+            assert_eq!(count_of(figures, "people_cut_off"), 1);
+            assert!((1..18).contains(&count_of(figures, "held_out_people")), "{figures}");
+            assert!(count_of(figures, "held_out_windows_of_others") > 100, "{figures}");
+            let accepted = figures["held_out_people_accepted"].as_float().unwrap();
+            let area = figures["area_under_roc_of_near_misses"].as_float().unwrap();
+            assert!(accepted > 0.9 && (0.5..=1.0).contains(&area), "{figures}");
             let model = Model::from_text(&fitted.model).unwrap();
             for seed in 100..110 {
-                let log_odds = |is_person: bool| {
+                let [person, bars] = [true, false].map(|is_person| {
                     let numbers = window_numbers(&picture(is_person, seed), &SQUARE, kind);
                     model.log_odds(model.sum_of(&numbers))
-                };
-                let person = log_odds(true);
-                let bars = log_odds(false);
+                });
                 assert!(person > 0.0 && bars < person, "{kind:?} {seed}: {person} {bars}");
             }
         }

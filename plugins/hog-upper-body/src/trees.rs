@@ -30,9 +30,10 @@ pub struct Tree {
 
 impl Tree {
     fn value(&self, numbers: &[f32]) -> f32 {
-        let is_no = |k: usize| numbers[usize::from(self.numbers[k])] >= self.below[k];
-        let side = usize::from(is_no(0));
-        self.values[2 * side + usize::from(is_no(1 + side))]
+        let side = usize::from(numbers[usize::from(self.numbers[0])] >= self.below[0]);
+        let child = 1 + side;
+        let is_no = numbers[usize::from(self.numbers[child])] >= self.below[child];
+        self.values[2 * side + usize::from(is_no)]
     }
 
     fn to_bytes(self) -> impl Iterator<Item = u8> {
@@ -41,14 +42,14 @@ impl Tree {
     }
 
     fn from_bytes(bytes: &[u8]) -> Self {
-        let long = |k: usize| {
+        let [first, second, third, values @ ..]: [f32; 7] = std::array::from_fn(|k| {
             let at = 6 + 4 * k;
             f32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
-        };
+        });
         Self {
             numbers: [0, 1, 2].map(|k| u16::from_le_bytes([bytes[2 * k], bytes[2 * k + 1]])),
-            below: [0, 1, 2].map(long),
-            values: [3, 4, 5, 6].map(long),
+            below: [first, second, third],
+            values,
         }
     }
 }
@@ -114,11 +115,11 @@ pub(crate) fn from_bytes(
 /// Bytes that are not trees; the message is one sentence.
 pub(crate) fn parse(bytes: &[u8], numbers: usize) -> Result<Vec<Tree>, String> {
     let trees: Vec<Tree> = bytes.chunks_exact(BYTES).map(Tree::from_bytes).collect();
-    let is_right = |tree: &Tree| {
+    let are_right = trees.iter().all(|tree| {
         let known = tree.numbers.iter().all(|n| usize::from(*n) < numbers);
         known && !tree.below.iter().any(|v| v.is_nan()) && tree.values.iter().all(|v| v.is_finite())
-    };
-    if trees.is_empty() || !bytes.len().is_multiple_of(BYTES) || !trees.iter().all(is_right) {
+    });
+    if trees.is_empty() || !bytes.len().is_multiple_of(BYTES) || !are_right {
         return Err("its trees are broken".into());
     }
     Ok(trees)

@@ -210,9 +210,14 @@ impl Group {
         let steps = config.sampling.steps();
         let mine = steps.choose(&self.weights, config.joint_side, &mut self.random);
         let theirs = steps.choose(&other.weights, config.joint_side, &mut other.random);
-        let weight = |a: usize, b: usize| steps.joint_weight([self.weights[a], other.weights[b]]);
-        let pairs = mine.iter().flat_map(|a| theirs.iter().map(|b| (*a, *b, weight(*a, *b))));
-        pairs.collect()
+        let mut pairs = Vec::with_capacity(mine.len() * theirs.len());
+        for a in &mine {
+            for b in &theirs {
+                let weights = [self.weights[*a], other.weights[*b]];
+                pairs.push((*a, *b, steps.joint_weight(weights)));
+            }
+        }
+        pairs
     }
 
     /// Returns the people at `columns` as a group of their own.
@@ -290,9 +295,12 @@ mod tests {
         let other = at_places(2, &[1.0, 2.0, 3.0], &[0.6, 0.1, 0.3]);
         let config = Config { method: Method::All, joint_side: 10, ..Config::default() };
         let merged = one.merge(other, &config);
-        let count = |person, y| places(&merged, person).iter().filter(|at| **at == y).count();
-        assert_eq!([0.1, 0.2, 0.3].map(|y| count(0, y)), [20, 50, 30]);
-        assert_eq!([1.0, 2.0, 3.0].map(|y| count(1, y)), [60, 10, 30]);
+        for (person, y, expected) in
+            [(0, 0.1, 20), (0, 0.2, 50), (0, 0.3, 30), (1, 1.0, 60), (1, 2.0, 10), (1, 3.0, 30)]
+        {
+            let found = places(&merged, person).iter().filter(|at| **at == y).count();
+            assert_eq!(found, expected, "{person} {y}");
+        }
         assert!(merged.weights.iter().all(|weight| (weight - 0.01).abs() < 1e-12));
     }
 

@@ -79,12 +79,10 @@ impl Wardrobe {
         seen: &BTreeMap<TrackId, Histogram>,
         margin: f64,
     ) -> bool {
-        let like = |known, now| match (self.known.get(known), seen.get(now)) {
-            (Some(known), Some(now)) => Some(coefficient(known, now)),
-            _ => None,
-        };
-        let gain = || Some(like(a, b)? + like(b, a)? - like(a, a)? - like(b, b)?);
-        gain().is_some_and(|gain| gain > margin)
+        let looks = [(a, b), (b, a), (a, a), (b, b)]
+            .map(|(known, now)| Some(coefficient(self.known.get(known)?, seen.get(now)?)));
+        let [Some(a_as_b), Some(b_as_a), Some(own_a), Some(own_b)] = looks else { return false };
+        a_as_b + b_as_a - own_a - own_b > margin
     }
 }
 
@@ -132,8 +130,10 @@ mod tests {
     fn frame(mirrored: bool, with_colour: bool) -> Frame {
         let lens = Pinhole { fx: 80.0, fy: 80.0, cx: 49.5, cy: 39.5, distortion: Distortion::None };
         let camera = Arc::new(Camera::mounted(lens, 100, 80, 1.5, 0.0, 0.0));
-        let pixel = |x: usize, _| if (x < 50) != mirrored { [200, 20, 20] } else { [20, 20, 200] };
-        let colour = with_colour.then(|| Arc::new(RgbImage::from_fn(100, 80, pixel)));
+        let image = RgbImage::from_fn(100, 80, |x, _| {
+            if (x < 50) != mirrored { [200, 20, 20] } else { [20, 20, 200] }
+        });
+        let colour = with_colour.then(|| Arc::new(image));
         let images = Images { colour, ..Images::default() };
         Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), images)
     }
@@ -169,12 +169,10 @@ mod tests {
     #[test]
     fn colours_are_those_of_the_chest_and_are_learned_slowly() {
         let head = people()[&IDS[0]];
-        let of = |mirrored| {
+        let [red, blue] = [false, true].map(|mirrored| {
             let frame = frame(mirrored, true);
             colours(&frame, frame.colour().unwrap(), &head).unwrap()
-        };
-        let red = of(false);
-        let blue = of(true);
+        });
         assert!((red.iter().sum::<f64>() - 1.0).abs() < 1e-12);
         // In six shades, 200 and 20 of 256 are 4 and 0.
         assert_eq!((red[4 * 36], blue[4]), (1.0, 1.0));
@@ -190,10 +188,15 @@ mod tests {
     fn where_the_chest_is_out_of_the_image_there_is_no_colour() {
         let frame = frame(false, true);
         let image = frame.colour().unwrap();
-        let of = |place| colours(&frame, image, &place).is_some();
-        assert!(of(Point3::new(2.0, 0.6, 1.6)));
-        assert!(!of(Point3::new(2.0, 3.0, 1.6)) && !of(Point3::new(-2.0, 0.0, 1.6)));
-        assert!(!of(Point3::new(2.0, 0.0, 0.2)), "below");
+        for (place, expected) in [
+            (Point3::new(2.0, 0.6, 1.6), true),
+            (Point3::new(2.0, 3.0, 1.6), false),
+            (Point3::new(-2.0, 0.0, 1.6), false),
+            // Below.
+            (Point3::new(2.0, 0.0, 0.2), false),
+        ] {
+            assert_eq!(colours(&frame, image, &place).is_some(), expected, "{place}");
+        }
     }
 
     #[test]

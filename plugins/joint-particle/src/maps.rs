@@ -48,8 +48,8 @@ fn parzen_at_all(
 ) -> Vec<f64> {
     let mut sums = vec![0.0; at.len()];
     for (at, sums) in at.chunks(LANES).zip(sums.chunks_mut(LANES)) {
-        let lanes = |axis: usize| std::array::from_fn(|i| at[i.min(at.len() - 1)][axis]);
-        let found = parzen_lanes(places, likelihoods, kernel, &[lanes(0), lanes(1)]);
+        let lanes = [0, 1].map(|axis| std::array::from_fn(|i| at[i.min(at.len() - 1)][axis]));
+        let found = parzen_lanes(places, likelihoods, kernel, &lanes);
         sums.copy_from_slice(&found[..sums.len()]);
     }
     sums
@@ -186,9 +186,10 @@ impl Grid {
 
     /// Returns all places, ordered by that of the near person.
     pub fn places(&self) -> Vec<PositionPair> {
-        let value = |axis: usize, i: usize| i as f64 * self.step - self.reach[axis];
-        let rows = 0..self.sides[0];
-        rows.flat_map(|i| (0..self.sides[1]).map(move |j| [value(0, i), value(1, j)])).collect()
+        let [near, far] = [0, 1].map(|axis| -> Vec<f64> {
+            (0..self.sides[axis]).map(|i| i as f64 * self.step - self.reach[axis]).collect()
+        });
+        near.iter().flat_map(|near| far.iter().map(move |far| [*near, *far])).collect()
     }
 
     /// Returns the number of places of the far person for each of the near one.
@@ -198,11 +199,11 @@ impl Grid {
 
     /// Returns the value of the nearest place; outside of the table that of its edge.
     pub fn look_up(&self, table: &[f64], at: &PositionPair) -> f64 {
-        let index = |axis: usize| {
+        let [row, column] = [0, 1].map(|axis| {
             let steps = ((at[axis] + self.reach[axis]) / self.step).round();
             steps.clamp(0.0, (self.sides[axis] - 1) as f64) as usize
-        };
-        table.get(index(0) * self.sides[1] + index(1)).copied().unwrap_or_default()
+        });
+        table.get(row * self.sides[1] + column).copied().unwrap_or_default()
     }
 }
 
@@ -226,8 +227,12 @@ mod tests {
     /// Places near the ridge, like those of the best particles of the previous frame.
     fn sampled(count: usize, seed: u64) -> Vec<PositionPair> {
         let mut random = Random::new(seed, 0);
-        let mut draw = |centre: f64, spread: f64| centre + spread * random.normal();
-        (0..count).map(|_| [draw(0.03, 0.08), draw(0.2, 0.25)]).collect()
+        (0..count)
+            .map(|_| {
+                [(0.03, 0.08), (0.2, 0.25)]
+                    .map(|(centre, spread)| centre + spread * random.normal())
+            })
+            .collect()
     }
 
     proptest! {
@@ -285,12 +290,14 @@ mod tests {
             let places = sampled(50, seed);
             let known: Vec<f64> = places.iter().map(ridge).collect();
             let gp = Gp::fit(places.clone(), &known, right, 0.03).unwrap();
-            let of = |map: &dyn Fn(&PositionPair) -> f64| {
-                correlation(&grid.iter().map(map).collect::<Vec<_>>(), &truth)
-            };
-            sums[0] += of(&|at| parzen(&places, &known, narrow, at)) / 10.0;
-            sums[1] += of(&|at| parzen(&places, &known, right, at)) / 10.0;
-            sums[2] += of(&|at| gp.at(at)) / 10.0;
+            let maps: [Vec<f64>; 3] = [
+                grid.iter().map(|at| parzen(&places, &known, narrow, at)).collect(),
+                grid.iter().map(|at| parzen(&places, &known, right, at)).collect(),
+                grid.iter().map(|at| gp.at(at)).collect(),
+            ];
+            for (sum, map) in sums.iter_mut().zip(&maps) {
+                *sum += correlation(map, &truth) / 10.0;
+            }
         }
         sums
     }
@@ -325,13 +332,12 @@ mod tests {
     #[test]
     fn the_nugget_says_how_closely_the_process_follows() {
         let places = vec![[0.0, 0.0], [0.2, 0.5]];
-        let at = |nugget| {
+        for (nugget, expected) in [(1e-6, 1.0), (1.0, 0.5)] {
             let config = Config { nugget, ..Config::default() };
             let map = LikelihoodMap::new(Method::Gp, places.clone(), vec![1.0, 0.0], &config);
-            map.at(&[0.0, 0.0])
-        };
-        assert!((at(1e-6) - 1.0).abs() < 1e-3, "{}", at(1e-6));
-        assert!((at(1.0) - 0.5).abs() < 1e-3, "{}", at(1.0));
+            let found = map.at(&[0.0, 0.0]);
+            assert!((found - expected).abs() < 1e-3, "{nugget}: {found}");
+        }
     }
 
     #[test]
@@ -351,21 +357,24 @@ mod tests {
 
     #[test]
     fn interpolation_finds_the_mean_that_a_sum_of_kernels_misses() {
+        /// The mean place across of a map.
+        fn mean_across(grid: &[PositionPair], map: impl Fn(&PositionPair) -> f64) -> f64 {
+            let sum: f64 = grid.iter().map(&map).sum();
+            grid.iter().map(|at| at[1] * map(at)).sum::<f64>() / sum
+        }
+
         let grid = Grid::new(&Config::default()).places();
         let kernel = Kernel::new(&Config::default());
-        let mean = |map: &dyn Fn(&PositionPair) -> f64| {
-            let sum: f64 = grid.iter().map(map).sum();
-            grid.iter().map(|at| at[1] * map(at)).sum::<f64>() / sum
-        };
-        let truth = mean(&ridge);
+        let truth = mean_across(&grid, ridge);
         let mut by_sum = 0.0;
         let mut by_gp = 0.0;
         for seed in 0..10 {
             let places = sampled(50, seed);
             let known: Vec<f64> = places.iter().map(ridge).collect();
             let gp = Gp::fit(places.clone(), &known, kernel, 0.03).unwrap();
-            by_sum += (mean(&|at| parzen(&places, &known, kernel, at)) - truth).abs() / 10.0;
-            by_gp += (mean(&|at| gp.at(at)) - truth).abs() / 10.0;
+            let of_sum = mean_across(&grid, |at| parzen(&places, &known, kernel, at));
+            by_sum += (of_sum - truth).abs() / 10.0;
+            by_gp += (mean_across(&grid, |at| gp.at(at)) - truth).abs() / 10.0;
         }
         assert!(by_gp < 0.010 && by_sum > 1.5 * by_gp, "gp {by_gp} m, sum {by_sum} m");
     }

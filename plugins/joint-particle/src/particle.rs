@@ -282,13 +282,10 @@ mod tests {
         let mut random = Random::new(1, 0);
         let mut spread = Matrix2::zeros();
         for _ in 0..4000 {
-            let mut draw = |mean: f64, sigma: f64| mean + sigma * random.normal();
-            let moved = EgoMotion {
-                forward: draw(motion.forward, sigmas[0]),
-                left: draw(motion.left, sigmas[1]),
-                turn: draw(motion.turn, sigmas[2]),
-                ..motion
-            };
+            let parts =
+                [(motion.forward, sigmas[0]), (motion.left, sigmas[1]), (motion.turn, sigmas[2])];
+            let [forward, left, turn] = parts.map(|(mean, sigma)| mean + sigma * random.normal());
+            let moved = EgoMotion { forward, left, turn, ..motion };
             let off = moved.apply_to_point(standing.floor()) - particle.floor();
             spread += off * off.transpose() / 4000.0;
         }

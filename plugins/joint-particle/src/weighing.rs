@@ -93,11 +93,12 @@ impl<'a> WeighingInput<'a> {
 
     /// Returns the people of a group from near to far.
     fn order(&self, group: &Group) -> Vec<usize> {
-        let depth = |person: usize| {
+        let mut order = Vec::with_capacity(group.people());
+        for person in 0..group.people() {
             let m = group.mean(person);
-            self.frame.camera.depth_of(&nalgebra::Point3::new(m[0], m[1], m[2]))
-        };
-        let mut order: Vec<(f64, usize)> = (0..group.people()).map(|p| (depth(p), p)).collect();
+            let depth_m = self.frame.camera.depth_of(&nalgebra::Point3::new(m[0], m[1], m[2]));
+            order.push((depth_m, person));
+        }
         order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         order.into_iter().map(|(_, person)| person).collect()
     }
@@ -236,16 +237,14 @@ impl Lateral {
 
     /// Returns the scene with the two people at a place, in the order of the columns.
     fn scene(&self, place: &PositionPair) -> [Particle; 2] {
-        let moved = |i: usize| {
+        let [near, far] = [0, 1].map(|i| {
             let mut mean = self.means[i];
             let now = self.across.dot(&(Point2::new(mean[0], mean[1]) - self.origin));
             let shift = self.across * (place[i] - now);
             mean[0] += shift.x;
             mean[1] += shift.y;
             Particle { mean, covariance: nalgebra::Matrix5::zeros() }
-        };
-        let near = moved(0);
-        let far = moved(1);
+        });
         if self.near == 0 { [near, far] } else { [far, near] }
     }
 }
@@ -297,12 +296,12 @@ fn refine(group: &mut Group, look: &mut WeighingInput<'_>, person: usize) -> Res
         }
         let sigma = variance.sqrt();
         let id = group.ids[person];
-        let moved = |i: usize| {
+        let mut variants = Vec::with_capacity(SAMPLES);
+        for i in 0..SAMPLES {
             let mut moved = best.clone();
             moved.mean.fixed_rows_mut::<3>(0).axpy(offset(i, sigma), &h, 1.0);
-            look.person(id, &moved)
-        };
-        let variants: Vec<Person> = (0..SAMPLES).map(moved).collect();
+            variants.push(look.person(id, &moved));
+        }
         let logs = look.variants(group, row, person, variants.into_iter())?;
         let Some((shift, spread)) = measurement(&logs, sigma) else { continue };
         // A sampled likelihood may be sharper than the templates are accurate.
@@ -371,12 +370,15 @@ fn offset(i: usize, sigma: f64) -> f64 {
 /// Returns value and variance of the measurement that turns the prior N(0, sigma²) into the
 /// posterior; `None` if the likelihood is flat.
 fn measurement(logs: &[f64], sigma: f64) -> Option<(f64, f64)> {
-    let prior = |i: usize| -0.5 * (offset(i, sigma) / sigma).powi(2);
-    let mut weights: Vec<f64> = logs.iter().enumerate().map(|(i, log)| log + prior(i)).collect();
+    let mut weights: Vec<f64> = logs
+        .iter()
+        .enumerate()
+        .map(|(i, log)| log - 0.5 * (offset(i, sigma) / sigma).powi(2))
+        .collect();
     from_logs(&mut weights);
     let mean: f64 = weights.iter().enumerate().map(|(i, w)| w * offset(i, sigma)).sum();
-    let square = |i: usize| (offset(i, sigma) - mean).powi(2);
-    let variance: f64 = weights.iter().enumerate().map(|(i, w)| w * square(i)).sum();
+    let squares = weights.iter().enumerate().map(|(i, w)| w * (offset(i, sigma) - mean).powi(2));
+    let variance: f64 = squares.sum();
     // A posterior about as wide as the prior would mean a measurement of unbounded variance.
     if variance.is_nan() || variance >= 0.95 * sigma * sigma {
         return None;
@@ -389,21 +391,28 @@ fn measurement(logs: &[f64], sigma: f64) -> Option<(f64, f64)> {
 pub(crate) fn support(group: &Group, look: &mut WeighingInput<'_>) -> Result<Vec<f64>> {
     let row = group.best();
     let everybody: Vec<usize> = (0..group.people()).collect();
-    let scene = |look: &mut WeighingInput<'_>, people: &[usize]| -> Result<f64> {
-        let parts = group.row(row);
-        people.iter().for_each(|p| look.add(group.ids[*p], &parts[*p]));
-        // Likelihoods are relative to the empty scene.
-        if people.is_empty() {
-            return Ok(0.0);
-        }
-        Ok(look.ask(people.len())?.first().copied().unwrap_or_default())
-    };
-    let whole = scene(look, &everybody)?;
-    let without = |person: usize| everybody.iter().copied().filter(move |p| *p != person);
-    everybody
-        .iter()
-        .map(|person| Ok(whole - scene(look, &without(*person).collect::<Vec<_>>())?))
-        .collect()
+    let whole = log_of_people(group, row, look, &everybody)?;
+    let mut gains = Vec::with_capacity(everybody.len());
+    for person in 0..group.people() {
+        let others: Vec<usize> = everybody.iter().copied().filter(|p| *p != person).collect();
+        gains.push(whole - log_of_people(group, row, look, &others)?);
+    }
+    Ok(gains)
+}
+
+/// Returns the log-likelihood of some of the people of a particle, relative to the empty scene.
+fn log_of_people(
+    group: &Group,
+    row: usize,
+    look: &mut WeighingInput<'_>,
+    people: &[usize],
+) -> Result<f64> {
+    if people.is_empty() {
+        return Ok(0.0);
+    }
+    let parts = group.row(row);
+    people.iter().for_each(|p| look.add(group.ids[*p], &parts[*p]));
+    Ok(look.ask(people.len())?.first().copied().unwrap_or_default())
 }
 
 /// Adds a group to the sketch: its particles, the scene of the best one, and the likelihood over
@@ -522,11 +531,11 @@ mod tests {
         likelihood: &Formula,
         work: impl FnOnce(&mut Group, &mut WeighingInput<'_>) -> T,
     ) -> T {
-        let single = |id, x| {
+        let [one, other] = [(1, 2.0), (2, 3.0)].map(|(id, x)| {
             let detection = sighting(nalgebra::Point3::new(x, 0.0, 1.6), [0.01; 3]);
             Group::single(TrackId(id), &Particle::of(&detection, config), 1, config)
-        };
-        let mut group = single(1, 2.0).merge(single(2, 3.0), config);
+        });
+        let mut group = one.merge(other, config);
         let frame = frame(tagalong_core::EgoMotion::at_rest(0.1), None);
         let headings = BTreeMap::new();
         let sightings = BTreeMap::new();
@@ -555,8 +564,10 @@ mod tests {
         }
 
         fn of(fits: fn(f64) -> bool) -> Option<f64> {
-            let nats = move |p: &Person| if fits(p.velocity.y) { 5.0 } else { 0.0 };
-            way(&Formula::new(move |scene| scene.iter().map(nats).sum())).map(|way| way.y.round())
+            let likelihood = Formula::new(move |scene: &[Person]| {
+                scene.iter().map(|p| if fits(p.velocity.y) { 5.0 } else { 0.0 }).sum()
+            });
+            way(&likelihood).map(|way| way.y.round())
         }
 
         assert_eq!(way(&Formula::flat(3.0)), None);
@@ -601,12 +612,15 @@ mod tests {
         let all: Vec<PositionPair> =
             (0..100).map(|i| [0.01 * f64::from(i), -0.01 * f64::from(i)]).collect();
         let before: Vec<f64> = (0..100).map(|i| f64::from((i * 37) % 100)).collect();
-        let of = |chosen, points| {
-            super::chosen(&all, &before, &Config { chosen, points, ..Config::default() })
-        };
+        let [best, spread, few] =
+            [(Chosen::PreviousBest, 3), (Chosen::Spread, 29), (Chosen::Spread, 4)].map(
+                |(chosen, points)| {
+                    let config = Config { chosen, points, ..Config::default() };
+                    super::chosen(&all, &before, &config)
+                },
+            );
         // 37 times 27, 54 and 81 leave 99, 98 and 97.
-        assert_eq!(of(Chosen::PreviousBest, 3), [all[27], all[54], all[81]]);
-        let spread = of(Chosen::Spread, 29);
+        assert_eq!(best, [all[27], all[54], all[81]]);
         let coarse: Vec<PositionPair> = [-0.15, 0.0, 0.15]
             .into_iter()
             .flat_map(|near| [-0.45, 0.0, 0.45].map(|far| [near, far]))
@@ -614,7 +628,7 @@ mod tests {
         assert_eq!(spread[..9], coarse[..]);
         let fifth: Vec<PositionPair> = all.iter().copied().step_by(5).collect();
         assert_eq!(spread[9..], fifth[..]);
-        assert_eq!(of(Chosen::Spread, 4), coarse[..4]);
+        assert_eq!(few, coarse[..4]);
     }
 
     #[test]

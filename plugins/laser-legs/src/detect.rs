@@ -45,32 +45,33 @@ impl LaserLegs {
     fn legs(&self, beams: &Beams, funnel: &mut Funnel) -> Vec<Leg> {
         let max_width_m = self.config.segments.max_width_m;
         let segments = beams.segments(&self.config.segments);
-        let leg = |segment| {
+        let mut legs = Vec::new();
+        for segment in segments.iter().filter(|s| beams.width((*s).clone()) <= max_width_m) {
             let log_odds = self.model.log_odds(&features(beams, segment, &segments));
-            Leg { at: beams.middle(segment.clone()), log_odds }
-        };
-        let narrow = segments.iter().filter(|s| beams.width((*s).clone()) <= max_width_m);
-        let mut legs: Vec<Leg> = narrow.map(leg).collect();
-        legs.retain(|leg| {
-            let is_leg = leg.log_odds >= self.config.min_leg_log_odds;
-            if !is_leg {
+            if log_odds >= self.config.min_leg_log_odds {
+                legs.push(Leg { at: beams.middle(segment.clone()), log_odds });
+            } else {
                 funnel.drop_at("no leg", Rect::default());
             }
-            is_leg
-        });
+        }
         legs
     }
 
     /// Returns pairs of legs, the nearest ones first, and then the legs that remain.
     fn people(&self, legs: &[Leg]) -> Vec<Vec<Leg>> {
-        let apart = |(a, b): (usize, usize)| (legs[a].at - legs[b].at).norm();
-        let all = (0..legs.len()).flat_map(|a| (a + 1..legs.len()).map(move |b| (a, b)));
-        let mut pairs: Vec<(usize, usize)> =
-            all.filter(|pair| apart(*pair) <= self.config.max_stride_m).collect();
-        pairs.sort_by(|a, b| apart(*a).total_cmp(&apart(*b)));
+        let mut pairs = Vec::new();
+        for (a, leg) in legs.iter().enumerate() {
+            for (b, other) in legs.iter().enumerate().skip(a + 1) {
+                let apart_m = (leg.at - other.at).norm();
+                if apart_m <= self.config.max_stride_m {
+                    pairs.push((apart_m, a, b));
+                }
+            }
+        }
+        pairs.sort_by(|(one_m, ..), (other_m, ..)| one_m.total_cmp(other_m));
         let mut is_free = vec![true; legs.len()];
         let mut people = Vec::new();
-        for (a, b) in pairs {
+        for (_, a, b) in pairs {
             if is_free[a] && is_free[b] {
                 (is_free[a], is_free[b]) = (false, false);
                 people.push(vec![legs[a], legs[b]]);

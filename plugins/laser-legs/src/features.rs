@@ -103,12 +103,11 @@ fn spread(points: &[Point2<f64>], middle: &Point2<f64>) -> [f64; 3] {
 
 /// Returns the mean distance of the points from their median by coordinate, m.
 fn median_deviation(points: &[Point2<f64>]) -> f64 {
-    let median = |axis: usize| {
+    let median = Point2::from([0, 1].map(|axis| {
         let mut values: Vec<f64> = points.iter().map(|p| p[axis]).collect();
         values.sort_by(f64::total_cmp);
         0.5 * (values[(values.len() - 1) / 2] + values[values.len() / 2])
-    };
-    let median = Point2::new(median(0), median(1));
+    }));
     points.iter().map(|p| (p - median).norm()).sum::<f64>() / points.len() as f64
 }
 
@@ -168,9 +167,10 @@ fn curvature(points: &[Point2<f64>]) -> f64 {
 /// Returns by how much the point in the middle is nearer to the scanner than the ends, m.
 fn depth(points: &[Point2<f64>], middle: &Point2<f64>) -> f64 {
     let ahead: Vector2<f64> = middle.coords / middle.coords.norm().max(1e-9);
-    let along = |index: usize| points[index].coords.dot(&ahead);
     let last = points.len() - 1;
-    0.5 * (along(0) + along(last)) - 0.5 * (along(last / 2) + along(last.div_ceil(2)))
+    let [start, end, before, after] =
+        [0, last, last / 2, last.div_ceil(2)].map(|index| points[index].coords.dot(&ahead));
+    0.5 * (start + end) - 0.5 * (before + after)
 }
 
 /// Returns the distance to the reflection before a segment, and whether that is nearer.

@@ -178,9 +178,13 @@ mod tests {
     /// The robot turns by 0.2 rad before each scan.
     #[test]
     fn past_scans_turn_with_the_robot() {
-        let things = [Point2::new(3.0, -2.0), Point2::new(3.0, 0.0), Point2::new(3.0, 2.0)];
+        /// Returns where three things are after so many turns of the robot.
+        fn seen_after(turns: i32) -> [Point2<f64>; 3] {
+            let things = [Point2::new(3.0, -2.0), Point2::new(3.0, 0.0), Point2::new(3.0, 2.0)];
+            things.map(|at| Rotation2::new(-0.2 * f64::from(turns)) * at)
+        }
+
         let turning = EgoMotion { turn: 0.2, ..EgoMotion::at_rest(0.2) };
-        let seen_after = |turns: i32| things.map(|at| Rotation2::new(-0.2 * f64::from(turns)) * at);
         let mut past = PastScans::default();
         for turns in 1..=3 {
             past.predict(&turning);

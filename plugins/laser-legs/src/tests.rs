@@ -24,13 +24,13 @@ fn scan(rays: u32, rounds: &Rounds, pose: Isometry3<f64>) -> LaserScan {
     for ray in 0..rays {
         let angle = -0.5 * TAU + f64::from(ray) * step;
         let ahead = nalgebra::Vector2::new(angle.cos(), angle.sin());
-        let range = |(at, radius): &([f64; 2], f64)| {
+        let ranges = rounds.iter().filter_map(|(at, radius)| {
             let at = nalgebra::Vector2::new(at[0], at[1]);
             let along = at.dot(&ahead);
             let square = radius * radius - (at.norm_squared() - along * along);
             (along > 0.0 && square > 0.0).then(|| along - square.sqrt())
-        };
-        if let Some(range) = rounds.iter().filter_map(range).min_by(f64::total_cmp) {
+        });
+        if let Some(range) = ranges.min_by(f64::total_cmp) {
             points.push(pose * Point3::new(range * ahead.x, range * ahead.y, 0.0));
             numbers.push(ray);
         }
@@ -146,21 +146,21 @@ fn a_place_that_was_free_speaks_for_a_person() {
     let mut detector = LaserLegs::new(config.clone(), &context()).unwrap();
     assert!(detector.remembers() && !LaserLegs::new(all(), &context()).unwrap().remembers());
     let camera = Arc::new(Camera::blind(Isometry3::identity()));
-    let mut see = |things: &Rounds| {
+    let both = [([2.0, 1.5], 0.06), ([2.0, -1.5], 0.06)];
+    let mut found = Vec::new();
+    for look in 0..=11 {
+        let things = if look == 11 { &both[..] } else { &both[..1] };
         let still = EgoMotion::at_rest(0.1);
         let frame = Frame::new(1, Stamp::default(), Arc::clone(&camera), still, Images::default())
             .with_laser(Some(scan(720, things, Isometry3::identity())));
         let query = Query::Discover { occupied: &[] };
-        detector.detect(&frame, &query, &mut Funnel::default()).unwrap()
-    };
-    let thing = [([2.0, 1.5], 0.06)];
-    let first = see(&thing)[0].score;
-    let later = (0..10).map(|_| see(&thing)[0].score).last().unwrap();
+        found.push(detector.detect(&frame, &query, &mut Funnel::default()).unwrap());
+    }
+    let first = found[0][0].score;
+    let later = found[10][0].score;
     assert!((later - first + 2.0).abs() < 1e-9, "it stood there: {first} {later}");
-    let came = see(&[thing[0], ([2.0, -1.5], 0.06)]);
-    let new = came.iter().find(|d| d.position.y < 0.0).unwrap();
-    let unknown =
-        detections(config, scan(720, &[thing[0], ([2.0, -1.5], 0.06)], Isometry3::identity()));
+    let new = found[11].iter().find(|d| d.position.y < 0.0).unwrap();
+    let unknown = detections(config, scan(720, &both, Isometry3::identity()));
     let alone = unknown.iter().find(|d| d.position.y < 0.0).unwrap();
     assert!(new.score >= alone.score, "{} {}", new.score, alone.score);
 }
@@ -222,17 +222,23 @@ fn every_second_ray_is_a_scanner_of_half_the_resolution() {
 fn features_measure_the_thing_in_metres() {
     let beams = Beams::new(&scan(2880, &LEGS, Isometry3::identity()), 1);
     let segments = beams.segments(&Segmentation::default());
-    let of = |name: &str| {
+    let values = features(&beams, &segments[0], &segments);
+    for (name, expected, tolerance) in [
+        ("width", 0.12, 0.02),
+        ("radius", 0.06, 0.005),
+        ("circularity", 0.0, 1e-3),
+        ("depth", 0.05, 0.015),
+        ("neighbour", 0.3, 0.02),
+        ("second_neighbour", 1.0, 1e-9),
+        ("neighbours", 1.0, 1e-9),
+        ("wall", 1.0, 1e-9),
+        ("smaller_jump", 0.5, 1e-9),
+        ("occluded_sides", 0.0, 1e-9),
+    ] {
         let at = FEATURES.iter().position(|feature| *feature == name).unwrap();
-        f64::from(features(&beams, &segments[0], &segments)[at])
-    };
-    assert!((of("width") - 0.12).abs() < 0.02, "{}", of("width"));
-    assert!((of("radius") - 0.06).abs() < 0.005, "{}", of("radius"));
-    assert!(of("circularity") < 1e-3);
-    assert!((of("depth") - 0.05).abs() < 0.015, "{}", of("depth"));
-    assert!((of("neighbour") - 0.3).abs() < 0.02, "{}", of("neighbour"));
-    assert_eq!((of("second_neighbour"), of("neighbours"), of("wall")), (1.0, 1.0, 1.0));
-    assert_eq!((of("smaller_jump"), of("occluded_sides")), (0.5, 0.0));
+        let found = f64::from(values[at]);
+        assert!((found - expected).abs() < tolerance, "{name}: {found}");
+    }
 }
 
 /// Returns reflections at places, all 0.1 rad apart, by the numbers of their rays.
@@ -303,11 +309,12 @@ fn each_feature_is_that_of_its_definition() {
         ("neighbours", 2.0),
         ("wall", 0.833333),
     ];
-    let of = |places: &[(u32, [f64; 2])]| features(&reflections(places), &segments[1], &segments);
-    assert_features(&of(&places), &expected);
+    let found = features(&reflections(&places), &segments[1], &segments);
+    assert_features(&found, &expected);
     // Four rays without a reflection: that side is open.
     places[5..].iter_mut().for_each(|(ray, _)| *ray += 1);
-    assert_features(&of(&places), &[("larger_jump", 0.5), ("smaller_jump", 0.05_f64.sqrt())]);
+    let found = features(&reflections(&places), &segments[1], &segments);
+    assert_features(&found, &[("larger_jump", 0.5), ("smaller_jump", 0.05_f64.sqrt())]);
     // The neighbours at both ends of a scan are those that there are.
     let first = features(&reflections(&places), &segments[0], &segments);
     assert_features(&first, &[("smaller_jump", 0.05_f64.sqrt()), ("larger_jump", 0.5)]);
@@ -342,17 +349,20 @@ fn a_model_survives_its_file_and_a_broken_one_is_refused() {
     assert_eq!(model.log_odds(&values), -2.0);
     values[0] = f32::NAN;
     assert_eq!(model.log_odds(&values), -2.5, "a value that is not a number is not below");
-    let refusal = |from: &str, to: &str| {
+    for (from, to, why) in [
+        ("legs 1", "legs 9", "legs 9"),
+        ("slope = 2.0", "slope = inf", "finite"),
+        ("\"width\"", "\"girth\"", "features"),
+        // A way back to a node before it would have no end.
+        ("[0, 0.25, 1,", "[0, 0.25, 7,", "hang together"),
+        ("[0, 0.25, 1,", "[99, 0.25, 1,", "hang together"),
+        // To itself.
+        ("[3, 0.5, 0,", "[3, 0.5, 1,", "hang together"),
+    ] {
         assert!(text.contains(from), "{text}");
-        Model::from_text(&text.replace(from, to)).unwrap_err()
-    };
-    assert!(refusal("legs 1", "legs 9").contains("legs 9"));
-    assert!(refusal("slope = 2.0", "slope = inf").contains("finite"));
-    assert!(refusal("\"width\"", "\"girth\"").contains("features"));
-    // A way back to a node before it would have no end.
-    assert!(refusal("[0, 0.25, 1,", "[0, 0.25, 7,").contains("hang together"));
-    assert!(refusal("[0, 0.25, 1,", "[99, 0.25, 1,").contains("hang together"));
-    assert!(refusal("[3, 0.5, 0,", "[3, 0.5, 1,").contains("hang together"), "to itself");
+        let refusal = Model::from_text(&text.replace(from, to)).unwrap_err();
+        assert!(refusal.contains(why), "{refusal}");
+    }
 }
 
 #[test]
@@ -408,7 +418,7 @@ mod training {
             training: Training { trees: vec![10], every_ray: vec![2], ..Training::default() },
             ..Config::default()
         };
-        let fit = || {
+        let [fitted, again] = [(); 2].map(|()| {
             let mut trainer = train::LegTrainer::new(&config, 1).unwrap();
             for number in 0..24_u32 {
                 let x = 1.5 + 0.1 * f64::from(number % 12);
@@ -421,24 +431,25 @@ mod training {
                 trainer.add(&frame, &candidate([0.0, 0.0]), rest).unwrap();
             }
             trainer.fit(&mut |_| ()).unwrap()
-        };
-        let fitted = fit();
-        assert_eq!(fitted, fit(), "the same bytes");
+        });
+        assert_eq!(fitted, again, "the same bytes");
         // One leg and two poles in each of 24 scans, with all rays and with every second one.
-        let number = |key: &str| fitted.figures[key].as_integer();
-        assert_eq!(
-            (number("legs"), number("others"), number("trees")),
-            (Some(48), Some(96), Some(10))
-        );
+        for (name, expected) in [("legs", 48), ("others", 96), ("trees", 10)] {
+            assert_eq!(fitted.figures[name].as_integer(), Some(expected), "{name}");
+        }
         let model = Model::from_text(&fitted.model).unwrap();
         assert!(
             (fitted.figures["slope"].as_float().unwrap() - model.slope).abs() < 1e-4
                 && model.slope > 0.01
         );
         let row = fitted.figures["cross_validation"].as_array().unwrap()[0].as_table().unwrap();
-        let part = |key: &str| row[key].as_float().unwrap();
-        assert!(part("legs_accepted") > 0.9 && part("others_accepted") < 0.1, "{row:?}");
-        assert!(part("area_under_roc") > 0.99);
+        for (name, range) in [
+            ("legs_accepted", 0.9..=1.0),
+            ("others_accepted", 0.0..=0.1),
+            ("area_under_roc", 0.99..=1.0),
+        ] {
+            assert!(range.contains(&row[name].as_float().unwrap()), "{name}: {row:?}");
+        }
         let beams = Beams::new(
             &scan(720, &[([2.05, 0.1], 0.06), ([2.0, 2.0], 0.2)], Isometry3::identity()),
             1,

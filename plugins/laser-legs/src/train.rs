@@ -4,6 +4,8 @@
 //! closes the scan, and labels its other segments as clutter. Simulated scans come as whole frames
 //! with the heads in them; they are fitted, and never held out.
 
+use std::collections::BTreeMap;
+
 use nalgebra::Point2;
 use tagalong_config::{AnnotatedPerson, Example, Fitted, Trainer};
 use tagalong_core::{Detection, Error, Frame, LaserScan, Result};
@@ -26,6 +28,13 @@ pub struct Sample {
     pub example: Example,
     /// False for a sample of a simulated scan, which is no measure of a model.
     pub is_real: bool,
+}
+
+impl Sample {
+    /// Whether the sample is held out with a part of the groups.
+    fn is_in(&self, parts: &BTreeMap<u64, usize>, fold: usize) -> bool {
+        self.is_real && parts.get(&self.example.group) == Some(&fold)
+    }
 }
 
 /// Places of legs in a scan, or of people, with the distance of a leg from them.
@@ -100,18 +109,17 @@ impl LegTrainer {
     /// Tries all numbers of trees on held-out groups.
     fn trials(&self, progress: &mut dyn FnMut(f64)) -> Vec<Trial> {
         let Training { trees: counts, folds, .. } = &self.training;
-        let real = || self.samples.iter().filter(|sample| sample.is_real);
-        let parts = parts(real().map(|sample| sample.example), *folds, self.seed);
+        let real = self.samples.iter().filter(|sample| sample.is_real);
+        let parts = parts(real.map(|sample| sample.example), *folds, self.seed);
         let most = counts.iter().copied().max().unwrap_or(0);
         let mut trials: Vec<Trial> =
             counts.iter().map(|&trees| Trial { trees, held_out: Vec::new() }).collect();
         for fold in 0..*folds {
-            let is_out = |s: &Sample| s.is_real && parts.get(&s.example.group) == Some(&fold);
-            let trees = self.grow(most, |sample| !is_out(sample));
+            let trees = self.grow(most, |sample| !sample.is_in(&parts, fold));
             for trial in &mut trials {
                 let trees = trees[..trial.trees.min(trees.len())].to_vec();
                 let model = Model { trees, slope: 1.0, offset: 0.0 };
-                let out = self.samples.iter().filter(|sample| is_out(sample));
+                let out = self.samples.iter().filter(|sample| sample.is_in(&parts, fold));
                 let judged = out.map(|s| (model.sum(&s.features), s.example.is_person));
                 trial.held_out.extend(judged);
             }
@@ -126,14 +134,15 @@ impl LegTrainer {
         fn number(n: usize) -> toml::Value {
             toml::Value::Integer(n as i64)
         }
-        let row = |trial: &Trial| {
-            toml::Value::Table(toml::Table::from_iter([
+        let mut rows = Vec::with_capacity(trials.len());
+        for trial in trials {
+            rows.push(toml::Value::Table(toml::Table::from_iter([
                 ("trees".to_owned(), number(trial.trees)),
                 ("area_under_roc".to_owned(), rounded(area(&trial.held_out))),
                 ("legs_accepted".to_owned(), rounded(accepted(&calibrated(trial), true))),
                 ("others_accepted".to_owned(), rounded(accepted(&calibrated(trial), false))),
-            ]))
-        };
+            ])));
+        }
         toml::Table::from_iter([
             ("legs".to_owned(), number(legs)),
             ("others".to_owned(), number(self.samples.len() - legs)),
@@ -141,7 +150,7 @@ impl LegTrainer {
             ("trees".to_owned(), number(model.trees.len())),
             ("slope".to_owned(), rounded(model.slope)),
             ("offset".to_owned(), rounded(model.offset)),
-            ("cross_validation".to_owned(), toml::Value::Array(trials.iter().map(row).collect())),
+            ("cross_validation".to_owned(), toml::Value::Array(rows)),
         ])
     }
 }

@@ -79,13 +79,12 @@ impl Blob {
             *count >= ROW_PIXELS
         }
 
-        let columns = &counts.columns;
-        let width = columns.len();
-        let height = |column: usize| f64::from(columns[column]);
-        let fullest = run.columns(width).map(height).fold(0.0, f64::max);
+        let width = counts.columns.len();
+        let heights: Vec<f64> = counts.columns.iter().map(|count| f64::from(*count)).collect();
+        let fullest = run.columns(width).map(|column| heights[column]).fold(0.0, f64::max);
         // Bottom and top come from the core: an arm or a remnant of a shadow would shift them.
         let core: Vec<usize> =
-            run.columns(width).filter(|c| height(*c) >= CORE * fullest).collect();
+            run.columns(width).filter(|column| heights[*column] >= CORE * fullest).collect();
         let rows: Vec<u32> = counts
             .solid
             .chunks_exact(width)
@@ -97,7 +96,7 @@ impl Blob {
         let features = Features {
             width: run.length as f64,
             bottom: (rows.len() - 1 - lowest) as f64,
-            pixels: run.columns(width).map(height).sum(),
+            pixels: run.columns(width).map(|column| heights[column]).sum(),
             top: top as f64,
             middle,
             core: core.len() as f64,
@@ -105,7 +104,8 @@ impl Blob {
         };
         let upper = top..(middle as usize + 1).min(rows.len());
         let colour = mean_colour(&core, upper, counts, colours);
-        Some(Self { run, column: mean(&run, width, height), features, colour, visible: 1.0 })
+        let column = mean(&run, width, |column| heights[column]);
+        Some(Self { run, column, features, colour, visible: 1.0 })
     }
 }
 

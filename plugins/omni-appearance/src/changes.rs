@@ -120,8 +120,9 @@ mod tests {
 
     /// Two rows of grey with other values in some columns.
     fn image(columns: &[usize], value: u8) -> Vec<u8> {
-        let row = |column: usize| [if columns.contains(&column) { value } else { 100 }; 3];
-        (0..2 * WIDTH).flat_map(|pixel| row(pixel % WIDTH)).collect()
+        let pixels = (0..2 * WIDTH)
+            .flat_map(|pixel| [if columns.contains(&(pixel % WIDTH)) { value } else { 100 }; 3]);
+        pixels.collect()
     }
 
     #[test]
@@ -150,16 +151,14 @@ mod tests {
         let run = Run { first: 0, length: WIDTH };
         let solid = [1; 2 * WIDTH];
         let step = EgoMotion { forward: 0.05, turn: 0.1, ..EgoMotion::at_rest(0.08) };
-        let mut part = |column: usize| {
+        // Each image shows another column. That of three steps ago is the first to be old enough.
+        for (column, expected) in [(0, 6.0), (1, 6.0), (2, 6.0), (0, 0.0), (1, 0.0), (3, 2.0)] {
             changes.move_by(&step);
             changes.compare(&mut sweep, &[], &image(&[column], 200));
             changes.keep(&image(&[column], 200));
-            changes.part(run, WIDTH, &solid) * WIDTH as f64
-        };
-        // Each image shows another column. That of three steps ago is the first to be old enough.
-        let parts = [0, 1, 2, 0, 1, 3].map(&mut part);
-        let expected = [6.0, 6.0, 6.0, 0.0, 0.0, 2.0];
-        assert!(parts.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{parts:?}");
+            let part = changes.part(run, WIDTH, &solid) * WIDTH as f64;
+            assert!((part - expected).abs() < 1e-9, "{column}: {part}");
+        }
     }
 
     #[test]

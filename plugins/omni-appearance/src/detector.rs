@@ -236,14 +236,13 @@ mod tests {
         let track = Track::new(TrackId(1), Estimate::new(person, covariance, Rect::default()), 1.0)
             .with_age(3);
         let reach = 3.0 * 0.2 + 0.3;
-        let near = |way: Vector2<f64>| {
-            let position = Point3::new(2.0 + way.x, 1.0 + way.y, 0.2);
-            let person = Detection::new("test", position, Matrix3::identity(), 0.0)
-                .with_image(ImageBox::upper_body(Rect::default()));
-            fits(&Query::Track(&track), &person)
-        };
         for way in [Vector2::new(0.6, 0.8), Vector2::new(-0.6, 0.8)] {
-            assert!(near(way * (reach - 1e-6)) && !near(way * (reach + 1e-6)));
+            for (off_m, is_near) in [(reach - 1e-6, true), (reach + 1e-6, false)] {
+                let position = Point3::new(2.0 + off_m * way.x, 1.0 + off_m * way.y, 0.2);
+                let person = Detection::new("test", position, Matrix3::identity(), 0.0)
+                    .with_image(ImageBox::upper_body(Rect::default()));
+                assert_eq!(fits(&Query::Track(&track), &person), is_near, "{off_m} {way}");
+            }
         }
     }
 }

@@ -98,20 +98,18 @@ pub(crate) fn divided(run: Run, width: usize, expected: &[Expected]) -> Vec<Part
             _ => parts.push((owner, Run { first: (run.first + offset) % width, length: 1 })),
         }
     }
-    // A person that is seen on both sides of a nearer one is measured by the larger part.
-    let largest = |who: usize| {
+    let mut divided = Vec::new();
+    for (who, expected) in inside.iter().enumerate() {
+        // A person that is seen on both sides of a nearer one is measured by the larger part.
         let own = parts.iter().filter(|(owner, _)| *owner == who).map(|(_, part)| *part);
-        own.max_by_key(|part| part.length)
-    };
-    inside
-        .iter()
-        .enumerate()
-        .filter_map(|(who, expected)| {
-            let run = largest(who)?;
+        if let Some(run) = own.max_by_key(|part| part.length) {
             let visible = (run.length as f64 / (2.0 * expected.half).max(1.0)).min(1.0);
-            (visible >= LEAST_VISIBLE).then_some(Part { run, visible })
-        })
-        .collect()
+            if visible >= LEAST_VISIBLE {
+                divided.push(Part { run, visible });
+            }
+        }
+    }
+    divided
 }
 
 /// Returns the people that are expected in a run and not hidden behind others, from near to far.
@@ -121,13 +119,11 @@ fn visible(run: Run, width: usize, expected: &[Expected]) -> Vec<Expected> {
     inside.sort_by(|a, b| a.range_m.total_cmp(&b.range_m));
     let mut seen: Vec<Expected> = Vec::new();
     for person in inside {
-        let is_on = |who: &Expected, column: usize| who.is_near(column, width, 1.0);
-        let columns = run
-            .columns(width)
-            .filter(|column| {
-                is_on(&person, *column) && !seen.iter().any(|nearer| is_on(nearer, *column))
-            })
-            .count() as f64;
+        let columns = run.columns(width).filter(|column| {
+            person.is_near(*column, width, 1.0)
+                && !seen.iter().any(|nearer| nearer.is_near(*column, width, 1.0))
+        });
+        let columns = columns.count() as f64;
         if columns >= LEAST_VISIBLE * 2.0 * person.half {
             seen.push(person);
         }
@@ -144,9 +140,11 @@ fn shares(expected: &Expected, run: Run, width: usize) -> bool {
 /// Returns the person that a column belongs to: the nearest of those that cover it; otherwise the
 /// one with the nearest edge. `inside` goes from near to far.
 fn owner(column: usize, width: usize, inside: &[Expected]) -> usize {
-    let off = |who: usize| inside[who].off(column, width).abs();
-    let covering = (0..inside.len()).find(|who| inside[*who].is_near(column, width, 1.0));
-    covering.or_else(|| (0..inside.len()).min_by(|a, b| off(*a).total_cmp(&off(*b)))).unwrap_or(0)
+    if let Some(covering) = inside.iter().position(|who| who.is_near(column, width, 1.0)) {
+        return covering;
+    }
+    let off = inside.iter().map(|who| who.off(column, width).abs()).enumerate();
+    off.min_by(|(_, a), (_, b)| a.total_cmp(b)).map_or(0, |(who, _)| who)
 }
 
 #[cfg(test)]

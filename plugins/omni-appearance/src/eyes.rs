@@ -73,12 +73,14 @@ impl Eyes {
             funnel.drop_many("image of another size", 1);
             return Ok(Vec::new());
         }
-        // A clock that was set back means another recording.
-        let same = |scene: &ImageState| {
-            scene.size == size && scene.seen.is_none_or(|(_, stamp)| stamp <= frame.stamp)
-        };
         let scene = match &mut self.scene {
-            Some(scene) if same(scene) => scene,
+            // A clock that was set back means another recording.
+            Some(scene)
+                if scene.size == size
+                    && scene.seen.is_none_or(|(_, stamp)| stamp <= frame.stamp) =>
+            {
+                scene
+            }
             scene => scene.insert(ImageState::new(size, &self.config)),
         };
         if scene.seen != Some((frame.index, frame.stamp)) {

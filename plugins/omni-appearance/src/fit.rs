@@ -58,11 +58,12 @@ const TRIES: usize = 10;
 impl Fit {
     /// Fits a network that maps inputs to targets; the same seed gives the same network.
     pub(crate) fn network(&self, inputs: &[Vec<f64>], targets: &[f64], seed: u64) -> Network {
-        let start = |restart: u64| self.random(inputs, targets, mix(seed ^ (restart << 32)));
-        let fits =
-            (0..self.restarts.max(1)).map(|restart| self.descend(start(restart), inputs, targets));
+        let fits = (0..self.restarts.max(1)).map(|restart| {
+            let start = self.random(inputs, targets, mix(seed ^ (restart << 32)));
+            self.descend(start, inputs, targets)
+        });
         let best = fits.min_by(|a, b| a.0.total_cmp(&b.0));
-        best.map_or_else(|| start(0), |(_, network)| network)
+        best.map_or_else(|| self.random(inputs, targets, mix(seed)), |(_, network)| network)
     }
 
     /// Returns a network with small random weights.
@@ -72,24 +73,21 @@ impl Fit {
             (0..count).map(|i| mean_and_scale(inputs.iter().map(move |x| x[i]))).unzip();
         let (target, deviation) = mean_and_scale(targets.iter().copied());
         let mut state = seed;
-        let mut weight = |reach: f64| {
-            state = mix(state);
-            reach * (state as f64 / u64::MAX as f64 * 2.0 - 1.0)
-        };
         // Sums of this size keep the units in the steep part of tanh, where the gradient does
         // not vanish.
         let reach = 1.0 / (count as f64 + 1.0).sqrt();
-        let hidden =
-            (0..self.hidden).map(|_| (0..=count).map(|_| weight(reach)).collect()).collect();
-        let output = (0..=self.hidden).map(|_| weight(0.5)).collect();
+        let hidden = (0..self.hidden)
+            .map(|_| (0..=count).map(|_| random_weight(&mut state, reach)).collect())
+            .collect();
+        let output = (0..=self.hidden).map(|_| random_weight(&mut state, 0.5)).collect();
         Network { mean, scale, target: [target, deviation], hidden, output }
     }
 
     /// Reduces the cost from a starting network; returns the reached cost and network.
     fn descend(&self, start: Network, inputs: &[Vec<f64>], targets: &[f64]) -> (f64, Network) {
         let [mean, scale] = start.target;
-        let scaled = |x: &Vec<f64>| (0..x.len()).map(|i| start.scaled(x, i)).collect();
-        let inputs: Vec<Vec<f64>> = inputs.iter().map(scaled).collect();
+        let inputs: Vec<Vec<f64>> =
+            inputs.iter().map(|x| (0..x.len()).map(|i| start.scaled(x, i)).collect()).collect();
         let targets: Vec<f64> = targets.iter().map(|t| (t - mean) / scale).collect();
         let weights = weights_of(&start).len();
         let decay = self.decay * targets.len() as f64 / weights as f64;
@@ -218,6 +216,12 @@ fn linearised(
     (jacobian, errors)
 }
 
+/// Draws a weight of at most this size from a state, which moves on.
+fn random_weight(state: &mut u64, reach: f64) -> f64 {
+    *state = mix(*state);
+    reach * (*state as f64 / u64::MAX as f64 * 2.0 - 1.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -244,12 +248,12 @@ mod tests {
         let (jacobian, errors) = linearised(&network, &inputs, &targets);
         let weights = weights_of(&network);
         for column in 0..weights.len() {
-            let at = |step: f64| {
+            let [more, less] = [1e-5, -1e-5].map(|step| {
                 let mut moved = weights.clone();
                 moved[column] += step;
                 linearised(&with_weights(&network, &moved), &inputs, &targets).1
-            };
-            let slope = (at(1e-5) - at(-1e-5)) / 2e-5;
+            });
+            let slope = (more - less) / 2e-5;
             assert!((slope - jacobian.column(column)).norm() < 1e-8, "{column}");
         }
         assert!((errors[3] - (network.forward(|i| inputs[3][i]) - targets[3])).abs() < 1e-12);
@@ -283,16 +287,14 @@ mod tests {
     #[test]
     fn back_propagation_learns_more_slowly() {
         let (inputs, targets) = samples(150);
-        let network = |fit: Fit| fit.network(&inputs[..100], &targets[..100], 3);
-        let mean = |network: &Network| {
+        let fits = [DESCENT, DESCENT, FIT, Fit { steps: 20, ..DESCENT }];
+        let networks = fits.map(|fit| fit.network(&inputs[..100], &targets[..100], 3));
+        assert_eq!(networks[0], networks[1]);
+        let [slow, _, fast, short] = networks.map(|network| {
             (100..150).map(|i| (network.answer(&inputs[i]) - targets[i]).abs()).sum::<f64>() / 50.0
-        };
-        let by_descent = network(DESCENT);
-        assert_eq!(by_descent, network(DESCENT));
-        let slow = mean(&by_descent);
-        let fast = mean(&network(FIT));
+        });
         assert!(fast < 0.5 * slow && slow < 0.1, "{fast} {slow}");
-        assert!(mean(&network(Fit { steps: 20, ..DESCENT })) > 2.0 * slow);
+        assert!(short > 2.0 * slow, "{short} {slow}");
     }
 
     /// One step computed by hand: along the mean gradient, times the rate.
@@ -330,18 +332,18 @@ mod tests {
         let start = DESCENT.random(&pixels, &metres, 3);
         let raw = Network { mean: vec![0.0], scale: vec![1.0], target: [0.0, 1.0], ..start };
         let (_, raw) = DESCENT.descend(raw, &pixels, &metres);
-        let off = |network: &Network| {
+        let [scaled, raw] = [&scaled, &raw].map(|network| {
             let off = pixels.iter().zip(&metres).map(|(x, m)| (network.answer(x) - m).abs());
             off.fold(0.0, f64::max)
-        };
-        assert!(off(&scaled) < 0.1, "{}", off(&scaled));
-        assert!(off(&raw) > 1.0, "{}", off(&raw));
+        });
+        assert!(scaled < 0.1 && raw > 1.0, "{scaled} {raw}");
     }
 
     #[test]
     fn decay_keeps_weights_small() {
         let (inputs, targets) = samples(60);
-        let size = |decay| weights_of(&Fit { decay, ..FIT }.network(&inputs, &targets, 3)).norm();
-        assert!(size(1.0) < 0.5 * size(1e-4));
+        let [small, large] = [1.0, 1e-4]
+            .map(|decay| weights_of(&Fit { decay, ..FIT }.network(&inputs, &targets, 3)).norm());
+        assert!(small < 0.5 * large, "{small} {large}");
     }
 }

@@ -52,9 +52,9 @@ const KNOWN: f64 = 2.0;
 
 /// Returns the person with the closest appearance, if it is close enough to tell the person.
 pub fn recognised<'a>(people: &'a [Person], looks: &[f64; 4]) -> Option<&'a Person> {
-    let misfit = |known: &&Person| known.signature.misfit(looks);
-    let best = people.iter().min_by(|a, b| misfit(a).total_cmp(&misfit(b)));
-    best.filter(|known| misfit(known) < KNOWN)
+    let misfits = people.iter().map(|known| (known.signature.misfit(looks), known));
+    let best = misfits.min_by(|(a, _), (b, _)| a.total_cmp(b));
+    best.filter(|(misfit, _)| *misfit < KNOWN).map(|(_, known)| known)
 }
 
 /// Regressions of the distance, each with its standard deviation.
@@ -343,12 +343,19 @@ mod tests {
     fn cameras_are_alike_within_two_rows_and_three_centimetres() {
         // A row is half a degree.
         let one = Geometry { size: [480, 100], elevations_deg: [10.0, -40.0], height_m: 1.5 };
-        let like =
-            |elevations_deg, height_m| one.is_like(&Geometry { elevations_deg, height_m, ..one });
-        assert!(like([10.99, -40.99], 1.529) && like([9.01, -39.01], 1.471));
-        assert!(!like([11.01, -40.0], 1.5) && !like([10.0, -41.01], 1.5));
-        assert!(!like([8.99, -40.0], 1.5) && !like([10.0, -38.99], 1.5));
-        assert!(!like([10.0, -40.0], 1.531) && !like([10.0, -40.0], 1.469));
+        for (elevations_deg, height_m, expected) in [
+            ([10.99, -40.99], 1.529, true),
+            ([9.01, -39.01], 1.471, true),
+            ([11.01, -40.0], 1.5, false),
+            ([10.0, -41.01], 1.5, false),
+            ([8.99, -40.0], 1.5, false),
+            ([10.0, -38.99], 1.5, false),
+            ([10.0, -40.0], 1.531, false),
+            ([10.0, -40.0], 1.469, false),
+        ] {
+            let other = Geometry { elevations_deg, height_m, ..one };
+            assert_eq!(one.is_like(&other), expected, "{other:?}");
+        }
         assert!(!one.is_like(&Geometry { size: [480, 101], ..one }));
     }
 
@@ -371,13 +378,16 @@ mod tests {
         // Terms 3, 9, 1/4, 8 and 25, which are 1, 7/4, 0, 2 and 2 when scaled.
         assert!((ridge.answer(&features) - (3.0 + 1.0 - 1.75 + 0.0 + 1.0 - 4.0)).abs() < 1e-12);
         assert!(ridge.is_sane());
-        let broken = |change: fn(&mut Ridge)| {
-            let mut ridge = ridge;
-            change(&mut ridge);
-            !ridge.is_sane()
-        };
-        assert!(broken(|r| r.scale[2] = 0.0) && broken(|r| r.weights[5] = f64::NAN));
-        assert!(broken(|r| r.mean[0] = f64::INFINITY));
+        let changes: [fn(&mut Ridge); 3] = [
+            |ridge| ridge.scale[2] = 0.0,
+            |ridge| ridge.weights[5] = f64::NAN,
+            |ridge| ridge.mean[0] = f64::INFINITY,
+        ];
+        for change in changes {
+            let mut broken = ridge;
+            change(&mut broken);
+            assert!(!broken.is_sane());
+        }
     }
 
     #[test]

@@ -32,16 +32,12 @@ impl Network {
     /// Returns the scaled output for scaled inputs.
     pub(crate) fn forward(&self, input: impl Fn(usize) -> f64) -> f64 {
         let (weights, bias) = split(&self.output);
-        let unit = |weights: &[f64]| {
-            let (weights, bias) = split(weights);
-            weights.iter().enumerate().map(|(i, w)| w * input(i)).sum::<f64>() + bias
-        };
-        self.hidden
-            .iter()
-            .zip(weights)
-            .map(|(unit_weights, w)| w * unit(unit_weights).tanh())
-            .sum::<f64>()
-            + bias
+        let units = self.hidden.iter().zip(weights).map(|(unit, weight)| {
+            let (weights, bias) = split(unit);
+            let sum = weights.iter().enumerate().map(|(i, w)| w * input(i)).sum::<f64>() + bias;
+            weight * sum.tanh()
+        });
+        units.sum::<f64>() + bias
     }
 
     /// Returns true if the shapes match, for at most `inputs` inputs, and all numbers are finite.

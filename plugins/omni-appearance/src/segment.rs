@@ -181,8 +181,7 @@ impl Shadow {
 
     fn is_at(&self, colour: &[u8], level: &[u8]) -> bool {
         // A black background must not divide by 0.
-        let part = |i: usize| 256 * u32::from(colour[i]) / u32::from(level[i]).max(1);
-        let parts = [part(0), part(1), part(2)];
+        let parts = [0, 1, 2].map(|i| 256 * u32::from(colour[i]) / u32::from(level[i]).max(1));
         let (least, most) =
             parts.iter().fold((u32::MAX, 0), |(a, b), part| (a.min(*part), b.max(*part)));
         let mean = parts.iter().sum::<u32>() / 3;
@@ -226,18 +225,19 @@ mod tests {
     #[test]
     fn two_people_who_touch_are_divided_and_one_is_not() {
         let run = Run { first: 8, length: 8 };
-        let mut columns = [0u16; 12];
-        let mut put = |counts: [u16; 8]| {
+        let two = [20, 40, 38, 4, 3, 30, 41, 20];
+        let one = [5, 20, 40, 45, 38, 40, 20, 6];
+        let [both, alone] = [two, one].map(|counts| {
+            let mut columns = [0u16; 12];
             for (column, count) in run.columns(12).zip(counts) {
                 columns[column] = count;
             }
             divided(&run, &columns, 0.5)
-        };
-        let both = put([20, 40, 38, 4, 3, 30, 41, 20]);
+        });
         assert_eq!(both.len(), 2, "{both:?}");
         assert_eq!(both.iter().map(|part| part.length).sum::<usize>(), 8);
         assert_eq!(both[1].first, (both[0].first + both[0].length) % 12);
-        assert_eq!(put([5, 20, 40, 45, 38, 40, 20, 6]), [run]);
+        assert_eq!(alone, [run]);
     }
 
     #[test]

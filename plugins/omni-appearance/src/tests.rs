@@ -147,11 +147,14 @@ fn once_the_robot_has_moved_who_shows_no_change_is_furniture() {
     for (changed_part, when_it_stays) in [(0.3, 0), (0.0, 1)] {
         let mut detector = ready(Config { changed_part, ..analytic() }, &camera);
         assert!(see(&mut detector, &turning(20, &camera, &[])).is_empty());
-        let mut at =
-            |index, range| see(&mut detector, &turning(index, &camera, &[around(range, 60.0)]));
-        assert_eq!(at(21, 3.0).len(), 1, "who was not there before");
-        assert_eq!(at(22, 3.0).len(), when_it_stays);
-        assert_eq!(at(23, 2.0).len(), 1, "who comes nearer");
+        for (index, range, expected, why) in [
+            (21, 3.0, 1, "who was not there before"),
+            (22, 3.0, when_it_stays, "who stays"),
+            (23, 2.0, 1, "who comes nearer"),
+        ] {
+            let seen = see(&mut detector, &turning(index, &camera, &[around(range, 60.0)]));
+            assert_eq!(seen.len(), expected, "{why}");
+        }
     }
 }
 
@@ -203,10 +206,14 @@ fn the_shipped_model_is_one() {
     let model = Model::from_text(text).unwrap();
     assert_eq!(Model::from_text(&model.to_text().unwrap()).unwrap(), model);
     assert_eq!(model.people.len(), 2);
-    let refused = |from: &str, to: &str| Model::from_text(&text.replace(from, to)).unwrap_err();
-    assert!(refused("distance 3", "distance 9").contains("distance 9"));
-    assert!(refused("\"width\"", "\"girth\"").contains("features"));
-    assert!(refused("floor_offset_m = ", "floor_offset_m = inf #").contains("finite"));
+    for (from, to, why) in [
+        ("distance 3", "distance 9", "distance 9"),
+        ("\"width\"", "\"girth\"", "features"),
+        ("floor_offset_m = ", "floor_offset_m = inf #", "finite"),
+    ] {
+        let refusal = Model::from_text(&text.replace(from, to)).unwrap_err();
+        assert!(refusal.contains(why), "{refusal}");
+    }
 }
 
 #[test]

@@ -176,16 +176,18 @@ fn sample(
 ) -> Option<Sample> {
     let head = frame.camera.robot_from_camera.inverse_transform_point(head);
     let (true_bearing_rad, _) = view.panorama.mirror.direction(&head);
-    let bearing = |blob: &Blob| view.panorama.bearing(blob.column);
-    let off = |blob: &&Blob| angle(bearing(blob) - true_bearing_rad).abs();
-    let blob = blobs.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?;
+    let bearings = blobs.iter().map(|blob| {
+        let bearing_rad = view.panorama.bearing(blob.column);
+        (angle(bearing_rad - true_bearing_rad).abs(), bearing_rad, blob)
+    });
+    let (off_rad, bearing_rad, blob) = bearings.min_by(|(a, ..), (b, ..)| a.total_cmp(b))?;
     let distance_m = head.xy().coords.norm();
-    (off(&blob) < NEAR_RAD).then(|| Sample {
+    (off_rad < NEAR_RAD).then(|| Sample {
         features: blob.features,
         floor_m: view.floor_m(&blob.features),
         looks: view.looks(blob, distance_m),
         distance_m,
-        bearing_rad: bearing(blob),
+        bearing_rad,
         true_bearing_rad,
         person,
         frame: frame.index,
@@ -241,21 +243,27 @@ pub fn held_out(
     seed: u64,
 ) -> Result<Vec<Answers>> {
     let people: BTreeSet<u64> = samples.iter().map(|s| s.person).collect();
-    let key = |s: &Sample| match held {
-        // The rank of a person, not the number, spreads few people evenly over the parts.
-        HeldOut::People if people.len() > 1 => people.range(..s.person).count() as u64,
-        _ => s.frame / training.block_frames,
-    };
+    let mut keys = Vec::with_capacity(samples.len());
+    for sample in samples {
+        keys.push(match held {
+            // The rank of a person, not the number, spreads few people evenly over the parts.
+            HeldOut::People if people.len() > 1 => people.range(..sample.person).count() as u64,
+            _ => sample.frame / training.block_frames,
+        });
+    }
     let mut answers = vec![[0.0; WAYS.len()]; samples.len()];
     for fold in 0..FOLDS {
-        let is_test = |s: &Sample| key(s) % FOLDS == fold;
-        let rest: Vec<Sample> = samples.iter().filter(|s| !is_test(s)).copied().collect();
+        let rest = samples.iter().zip(&keys).filter(|(_, key)| **key % FOLDS != fold);
+        let rest: Vec<Sample> = rest.map(|(sample, _)| *sample).collect();
         if rest.len() == samples.len() {
             continue;
         }
         let fitted = head(&rest, training, seed)?;
-        let tested = samples.iter().zip(&mut answers).filter(|(sample, _)| is_test(sample));
-        tested.for_each(|(sample, answers)| *answers = sample.answers(&fitted));
+        for ((sample, key), answers) in samples.iter().zip(&keys).zip(&mut answers) {
+            if key % FOLDS == fold {
+                *answers = sample.answers(&fitted);
+            }
+        }
     }
     Ok(answers)
 }
@@ -329,8 +337,7 @@ fn ridge(samples: &[Sample], weight: f64) -> Ridge {
 
 /// Returns mean and standard deviation of the appearance in some samples.
 pub fn signature(samples: &[Sample]) -> Signature {
-    let of = |i: usize| mean_and_scale(samples.iter().map(move |s| s.looks[i]));
-    let all = [of(0), of(1), of(2), of(3)];
+    let all = [0, 1, 2, 3].map(|i| mean_and_scale(samples.iter().map(move |s| s.looks[i])));
     Signature { mean: all.map(|(mean, _)| mean), sigma: all.map(|(_, sigma)| sigma) }
 }
 
@@ -352,25 +359,28 @@ pub fn model(
     for sample in samples.iter().filter(|sample| sample.person < STRANGERS) {
         people.entry(sample.person).or_default().push(*sample);
     }
-    let believed = |samples: &[Sample], held: HeldOut, seed: u64| {
-        let mut head = head(samples, training, seed)?;
-        head.believe(samples, &held_out(samples, held, training, seed)?);
-        Ok::<Head, Error>(head)
-    };
-    Ok(Model {
-        geometry,
-        general: believed(samples, HeldOut::People, seed)?,
-        people: people
-            .iter()
-            .map(|(id, own)| {
-                Ok(Person {
-                    name: format!("person-{id}"),
-                    signature: signature(own),
-                    head: believed(own, HeldOut::Blocks, mix(seed ^ id))?,
-                })
-            })
-            .collect::<Result<_>>()?,
-    })
+    let mut heads = Vec::with_capacity(people.len());
+    let general = believed_head(samples, HeldOut::People, training, seed)?;
+    for (id, own) in &people {
+        heads.push(Person {
+            name: format!("person-{id}"),
+            signature: signature(own),
+            head: believed_head(own, HeldOut::Blocks, training, mix(seed ^ id))?,
+        });
+    }
+    Ok(Model { geometry, general, people: heads })
+}
+
+/// Fits a head, with standard deviations of held-out samples.
+fn believed_head(
+    samples: &[Sample],
+    held: HeldOut,
+    training: &Training,
+    seed: u64,
+) -> Result<Head> {
+    let mut head = head(samples, training, seed)?;
+    head.believe(samples, &held_out(samples, held, training, seed)?);
+    Ok(head)
 }
 
 /// `tagalong train omni-distance`: a candidate is a person at a known place; an image without
@@ -476,15 +486,14 @@ mod tests {
     fn the_spread_is_the_line_through_absolute_errors() {
         // Errors with the mean absolute value of a normal distribution of deviation 0.1 + 0.05 x.
         let half_normal = (2.0 / std::f64::consts::PI).sqrt();
-        let pairs = |slope: f64| {
+        let [rising, falling] = [0.05, -0.01].map(|slope| {
             let said = (1..=40).map(|i| 0.2 * f64::from(i));
-            said.map(move |x| (x, x + (0.1 + slope * x) * half_normal))
-        };
-        let line = spread(pairs(0.05));
-        assert!((line.start - 0.1).abs() < 1e-9 && (line.slope - 0.05).abs() < 1e-9, "{line:?}");
+            spread(said.map(|x| (x, x + (0.1 + slope * x) * half_normal)))
+        });
+        let off = [rising.start - 0.1, rising.slope - 0.05];
+        assert!(off.iter().all(|off| off.abs() < 1e-9), "{rising:?}");
         // A spread that falls with the distance is replaced by its value at the mean, 4.1 m.
-        let line = spread(pairs(-0.01));
-        assert!((line.start - 0.059).abs() < 1e-9 && line.slope == 0.0, "{line:?}");
+        assert!((falling.start - 0.059).abs() < 1e-9 && falling.slope == 0.0, "{falling:?}");
         let exact = spread([(1.0, 1.0), (2.0, 2.0)].into_iter());
         assert_eq!((exact.start, exact.slope), (0.02, 0.0));
         let one = spread([(1.0, 1.5)].into_iter());
@@ -559,8 +568,9 @@ mod tests {
         }
         // With one person alone, blocks are held out in both cases.
         let alone: Vec<Sample> = all.iter().map(|s| Sample { person: 3, ..*s }).collect();
-        let of = |held| held_out(&alone, held, &training, 1).unwrap();
-        assert_eq!(of(HeldOut::People), of(HeldOut::Blocks));
+        let [by_people, by_blocks] = [HeldOut::People, HeldOut::Blocks]
+            .map(|held| held_out(&alone, held, &training, 1).unwrap());
+        assert_eq!(by_people, by_blocks);
     }
 
     fn quick() -> Training {

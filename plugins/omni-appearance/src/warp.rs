@@ -37,12 +37,14 @@ impl Warp {
         let rows = panorama.rows;
         let across = columns / STEP + 2;
         let down = rows / STEP + 2;
-        let node = |row: usize, column: usize| {
-            let at = Point2::new((column * STEP) as f64, (row * STEP) as f64);
-            before(camera, panorama, motion, wall_m, at)
-        };
-        let nodes = (0..down).flat_map(|row| (0..across).map(move |c| (row, c)));
-        Self { columns, rows, nodes: nodes.map(|(row, c)| node(row, c)).collect(), across }
+        let mut nodes = Vec::with_capacity(across * down);
+        for row in 0..down {
+            for column in 0..across {
+                let at = Point2::new((column * STEP) as f64, (row * STEP) as f64);
+                nodes.push(before(camera, panorama, motion, wall_m, at));
+            }
+        }
+        Self { columns, rows, nodes, across }
     }
 
     /// Returns the place of a pixel before the motion.
@@ -51,14 +53,12 @@ impl Warp {
         let j = column % STEP;
         let x = j as f32 / STEP as f32;
         let y = (row % STEP) as f32 / STEP as f32;
-        let node = |offset: usize| self.nodes[i + offset];
-        let mix = |axis: usize| {
-            let upper = node(0)[axis] + x * (node(1)[axis] - node(0)[axis]);
-            let left = node(self.across)[axis];
-            let right = node(self.across + 1)[axis];
+        let nodes = [0, 1, self.across, self.across + 1].map(|offset| self.nodes[i + offset]);
+        [0, 1].map(|axis| {
+            let [upper_left, upper_right, left, right] = nodes.map(|node| node[axis]);
+            let upper = upper_left + x * (upper_right - upper_left);
             upper + y * (left + x * (right - left) - upper)
-        };
-        [mix(0), mix(1)]
+        })
     }
 
     /// Returns the pixel nearest to the place of a pixel before the motion.
@@ -77,14 +77,9 @@ impl Warp {
                 let (left, across) = self.column(x);
                 let (top, down) = self.row(y);
                 let right = if left + 1 == self.columns { 0 } else { left + 1 };
-                let pixel = |row: usize, column: usize| 3 * (row * self.columns + column);
-                let corners = [
-                    pixel(top, left),
-                    pixel(top, right),
-                    pixel(top + 1, left),
-                    pixel(top + 1, right),
-                ];
-                let at = pixel(row, column);
+                let corners = [(top, left), (top, right), (top + 1, left), (top + 1, right)]
+                    .map(|(row, column)| 3 * (row * self.columns + column));
+                let at = 3 * (row * self.columns + column);
                 for (colour, out) in to[at..at + 3].iter_mut().enumerate() {
                     let [a, b, c, d] = corners.map(|corner| from[corner + colour]);
                     let upper = a + across * (b - a);
@@ -164,8 +159,11 @@ impl Sweep {
         self.times.extend_from_slice(times);
         let blocks = (rows.div_ceil(BLOCK), columns.div_ceil(BLOCK));
         for (row, column) in (0..blocks.0).flat_map(|row| (0..blocks.1).map(move |c| (row, c))) {
-            let cost = |k: &usize| around(&self.costs[*k], (row, column), blocks);
-            let best = (0..warps.len()).min_by(|a, b| cost(a).total_cmp(&cost(b))).unwrap_or(0);
+            let best = (0..warps.len()).min_by(|a, b| {
+                let [of_a, of_b] = [*a, *b].map(|k| around(&self.costs[k], (row, column), blocks));
+                of_a.total_cmp(&of_b)
+            });
+            let best = best.unwrap_or(0);
             let across = column * BLOCK..(column * BLOCK + BLOCK).min(columns);
             for y in row * BLOCK..(row * BLOCK + BLOCK).min(rows) {
                 let pixels = 3 * (y * columns + across.start)..3 * (y * columns + across.end);
@@ -294,7 +292,7 @@ mod tests {
     fn room(camera: &Camera, pose: &nalgebra::Isometry2<f64>, wall_m: f64) -> Vec<f32> {
         let panorama = camera.panorama().unwrap();
         let pixels = (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (column, row)));
-        let colour = |(column, row): (usize, usize)| {
+        let colours = pixels.flat_map(|(column, row)| {
             let at = Point2::new(column as f64, row as f64);
             let elevation = panorama.elevation(at.y);
             let floor = panorama.mirror.floor_range_m(elevation, 1.5);
@@ -302,8 +300,13 @@ mod tests {
             let point = pose * camera.back_project(at, range).xy();
             let value = 100.0 + 60.0 * (1.3 * point.x).sin() + 40.0 * (1.1 * point.y).cos();
             [value as f32; 3]
-        };
-        pixels.flat_map(colour).collect()
+        });
+        colours.collect()
+    }
+
+    /// Returns the mean difference of two images.
+    fn mean_off(a: &[f32], b: &[f32]) -> f32 {
+        a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f32>() / a.len() as f32
     }
 
     #[test]
@@ -324,17 +327,14 @@ mod tests {
         Warp::new(&camera, panorama, &motion, 3.5).apply(&before, &mut moved);
         // The wall is at a fixed distance from the robot, which no real wall is; only the floor is
         // compared.
-        let near = |row: &usize| {
-            let elevation = panorama.elevation(*row as f64);
+        let near = (0..ROWS).position(|row| {
+            let elevation = panorama.elevation(row as f64);
             panorama.mirror.floor_range_m(elevation, 1.5).is_some_and(|r| (0.0..3.0).contains(&r))
-        };
-        let first = 3 * COLUMNS * (0..ROWS).find(near).unwrap();
-        let off = |a: &[f32], b: &[f32]| {
-            let pairs = a[first..].iter().zip(&b[first..]);
-            pairs.map(|(a, b)| (a - b).abs()).sum::<f32>() / (a.len() - first) as f32
-        };
-        assert!(off(&moved, &after) < 2.0, "{}", off(&moved, &after));
-        assert!(off(&before, &after) > 10.0, "{}", off(&before, &after));
+        });
+        let first = 3 * COLUMNS * near.unwrap();
+        let [warped, unmoved] =
+            [&moved, &before].map(|image| mean_off(&image[first..], &after[first..]));
+        assert!(warped < 2.0 && unmoved > 10.0, "{warped} {unmoved}");
     }
 
     #[test]
@@ -357,13 +357,12 @@ mod tests {
         let mut moved = before.clone();
         let mut times: Vec<f32> = (0..COLUMNS * ROWS).map(|pixel| pixel as f32).collect();
         Sweep::default().apply(&warps, &colours, &mut moved, &mut times);
-        let off = |a: &[f32]| {
-            a.iter().zip(&now).map(|(a, b)| (a - b).abs()).sum::<f32>() / now.len() as f32
-        };
-        assert!(off(&moved) < 0.05, "{}", off(&moved));
+        let off = mean_off(&moved, &now);
+        assert!(off < 0.05, "{off}");
         assert_eq!(times[40 * COLUMNS + 90] as usize, warps[1].nearest(90, 40));
         warps[2].apply(&before, &mut moved);
-        assert!(off(&moved) > 1.0, "{}", off(&moved));
+        let off = mean_off(&moved, &now);
+        assert!(off > 1.0, "{off}");
     }
 
     proptest! {

@@ -36,25 +36,28 @@ pub(crate) fn read(path: &Path) -> Result<Boxes> {
 
 fn parse(line: &str) -> std::result::Result<(u64, ExternalDetection), String> {
     let fields: Vec<&str> = line.split(',').map(str::trim).collect();
-    let number = |index: usize, name: &str| -> std::result::Result<f64, String> {
-        let text = fields.get(index).ok_or_else(|| {
-            format!("{} fields; expected frame, -1, x, y, width, height, score", fields.len())
-        })?;
-        let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
-        // A config may name any file, so no more than the start of a word is shown.
-        let shown: String = text.chars().take(SHOWN_CHARACTERS).collect();
-        value.ok_or_else(|| format!("`{name}` is `{shown}`, expected a number"))
-    };
-    let frame = number(0, "frame")?;
+    let frame = number_of(&fields, 0, "frame")?;
     if !(1.0..=LAST_FRAME).contains(&frame) || frame.fract() != 0.0 {
         return Err(format!("frame {frame}; frames are numbered from 1, up to {LAST_FRAME}"));
     }
-    let region =
-        Rect::new(number(2, "x")?, number(3, "y")?, number(4, "width")?, number(5, "height")?);
+    let [x, y] = [number_of(&fields, 2, "x")?, number_of(&fields, 3, "y")?];
+    let size = [number_of(&fields, 4, "width")?, number_of(&fields, 5, "height")?];
+    let region = Rect::new(x, y, size[0], size[1]);
     if region.width <= 0.0 || region.height <= 0.0 {
         return Err("a box without area".into());
     }
     // A box without a score counts as certain.
-    let score = if fields.len() > 6 { number(6, "score")? } else { 1.0 };
+    let score = if fields.len() > 6 { number_of(&fields, 6, "score")? } else { 1.0 };
     Ok((frame as u64, ExternalDetection::in_image(region, score)))
+}
+
+/// Reads a number of a line.
+fn number_of(fields: &[&str], index: usize, name: &str) -> std::result::Result<f64, String> {
+    let text = fields.get(index).ok_or_else(|| {
+        format!("{} fields; expected frame, -1, x, y, width, height, score", fields.len())
+    })?;
+    let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
+    // A config may name any file, so no more than the start of a word is shown.
+    let shown: String = text.chars().take(SHOWN_CHARACTERS).collect();
+    value.ok_or_else(|| format!("`{name}` is `{shown}`, expected a number"))
 }

@@ -174,12 +174,11 @@ fn a_position_outside_of_the_image_is_kept_without_a_box_if_the_settings_say_so(
     let behind = Point3::new(-2.5, 0.3, 1.6);
     let recorded = ExternalDetection::at(behind, 0.9);
     let frame = frame(1, None).with_recorded(Some(vec![recorded]));
-    let of = |outside_image| {
+    let [without, found] = [false, true].map(|outside_image| {
         let config = Config { outside_image, ..Config::default() };
         detect(&mut RecordedDetections::new(config, &context(".".as_ref())).unwrap(), &frame)
-    };
-    assert!(of(false).is_empty());
-    let found = of(true);
+    });
+    assert!(without.is_empty());
     assert_eq!((found[0].position, found[0].image), (behind, None));
 }
 
@@ -326,7 +325,12 @@ fn the_depth_is_that_of_the_face_alone() {
     let px_per_m = square.width / 0.57;
     let x = square.centre().x;
     let y = square.y + 0.14 * px_per_m;
-    let mut seen = |half_m: f64, inside: f32, outside: f32| {
+    for (half_m, inside, outside, expected_m, tolerance_m, why) in [
+        (0.085, 2.0, 5.0, 2.08, 0.02, "nothing beside it is looked at"),
+        (0.03, f32::NAN, 2.0, 2.08, 0.02, "and its edge is"),
+        (0.06, 5.0, 2.0, 5.08, 0.02, "most of it counts"),
+        (0.085, f32::NAN, 2.0, 3.0, 0.05, "holes do not count"),
+    ] {
         let half = half_m * px_per_m;
         let depth = DepthImage::from_fn(640, 480, |u, v| {
             let u = u as f64 + 0.5 - x;
@@ -336,12 +340,9 @@ fn the_depth_is_that_of_the_face_alone() {
         let images = Images { depth: Some(Arc::new(depth)), ..Images::default() };
         let frame =
             Frame::new(2, Stamp::from_nanos(200), camera(), EgoMotion::at_rest(0.1), images);
-        detect(&mut detector, &frame).remove(0).position.x
-    };
-    assert!((seen(0.085, 2.0, 5.0) - 2.08).abs() < 0.02, "nothing beside it is looked at");
-    assert!((seen(0.03, f32::NAN, 2.0) - 2.08).abs() < 0.02, "and its edge is");
-    assert!((seen(0.06, 5.0, 2.0) - 5.08).abs() < 0.02, "most of it counts");
-    assert!((seen(0.085, f32::NAN, 2.0) - 3.0).abs() < 0.05, "holes do not count");
+        let seen_m = detect(&mut detector, &frame).remove(0).position.x;
+        assert!((seen_m - expected_m).abs() < tolerance_m, "{why}: {seen_m}");
+    }
 }
 
 #[test]

@@ -54,11 +54,17 @@ fn histograms(grey: &Patch) -> Patch {
 
 /// Returns half the difference of the neighbours; one-sided at the border.
 fn gradient(grey: &Patch, row: usize, column: usize) -> [f32; 2] {
-    let at = |row: usize, column: usize| grey[row.min(SIDE - 1) * SIDE + column.min(SIDE - 1)];
+    let [up, left] = [row, column].map(|at| at.saturating_sub(1));
     [
-        0.5 * (at(row, column + 1) - at(row, column.saturating_sub(1))),
-        0.5 * (at(row + 1, column) - at(row.saturating_sub(1), column)),
+        0.5 * (clamped(grey, row, column + 1) - clamped(grey, row, left)),
+        0.5 * (clamped(grey, row + 1, column) - clamped(grey, up, column)),
     ]
+}
+
+/// Returns a value, or the nearest one in the last row and column.
+#[inline]
+fn clamped(grey: &Patch, row: usize, column: usize) -> f32 {
+    grey[row.min(SIDE - 1) * SIDE + column.min(SIDE - 1)]
 }
 
 /// Returns the mean gradient strength of a cell and its neighbours.
@@ -69,11 +75,10 @@ fn strength_around(histograms: &Patch, cell: usize) -> f32 {
     let rows = span(cell / CELLS);
     let columns = span(cell % CELLS);
     let count = (rows.len() * columns.len()) as f32;
-    let strength = |cell: usize| -> f32 {
-        histograms[cell * DIRECTIONS..(cell + 1) * DIRECTIONS].iter().sum()
-    };
     let cells = rows.flat_map(|row| columns.clone().map(move |column| row * CELLS + column));
-    cells.map(strength).sum::<f32>() / count
+    let strengths = cells
+        .map(|cell| -> f32 { histograms[cell * DIRECTIONS..(cell + 1) * DIRECTIONS].iter().sum() });
+    strengths.sum::<f32>() / count
 }
 
 #[cfg(test)]
@@ -108,16 +113,18 @@ mod tests {
 
     /// The descriptor by its definition, cell by cell, in double precision.
     fn slow(grey: &Patch) -> Vec<f64> {
-        let last = SIDE as i64 - 1;
-        let at = |row: i64, column: i64| -> f64 {
-            f64::from(grey[(row.clamp(0, last) * SIDE as i64 + column.clamp(0, last)) as usize])
-        };
+        fn grey_at(grey: &Patch, row: i64, column: i64) -> f64 {
+            let [row, column] = [row, column].map(|at| at.clamp(0, SIDE as i64 - 1) as usize);
+            f64::from(grey[row * SIDE + column])
+        }
         let mut cells = vec![vec![0.0; DIRECTIONS]; CELLS * CELLS];
         let mut strengths = [0.0; CELLS * CELLS];
         for row in 0..SIDE as i64 {
             for column in 0..SIDE as i64 {
-                let dx = (at(row, column + 1) - at(row, column - 1)) / 2.0;
-                let dy = (at(row + 1, column) - at(row - 1, column)) / 2.0;
+                let [right, left] = [column + 1, column - 1].map(|x| grey_at(grey, row, x));
+                let [below, above] = [row + 1, row - 1].map(|y| grey_at(grey, y, column));
+                let dx = (right - left) / 2.0;
+                let dy = (below - above) / 2.0;
                 let cell = (row / 4 * 5 + column / 4) as usize;
                 let strength = (dx * dx + dy * dy).sqrt();
                 strengths[cell] += strength;
@@ -127,18 +134,16 @@ mod tests {
                 cells[cell][(turn as usize + 1) % 16] += part * strength;
             }
         }
-        let around = |cell: usize| {
-            let near = |other: &usize| {
+        let mut all = Vec::new();
+        for (cell, own) in cells.iter().enumerate() {
+            let near = (0..25_usize).filter(|other| {
                 (other / 5).abs_diff(cell / 5) <= 1 && (other % 5).abs_diff(cell % 5) <= 1
-            };
-            let near: Vec<f64> = (0..25).filter(near).map(|other| strengths[other]).collect();
-            near.iter().sum::<f64>() / near.len() as f64
-        };
-        // The noise: one grey value per pixel in each of the 16 pixels.
-        let root = |cell: usize, own: &f64| (own / (around(cell) + 16.0)).sqrt();
-        let all =
-            cells.iter().enumerate().flat_map(|(cell, own)| own.iter().map(move |v| (cell, v)));
-        let all: Vec<f64> = all.map(|(cell, own)| root(cell, own)).collect();
+            });
+            let near: Vec<f64> = near.map(|other| strengths[other]).collect();
+            let around = near.iter().sum::<f64>() / near.len() as f64;
+            // The noise: one grey value per pixel in each of the 16 pixels.
+            all.extend(own.iter().map(|own| (own / (around + 16.0)).sqrt()));
+        }
         let length = all.iter().map(|v| v * v).sum::<f64>().sqrt();
         all.iter().map(|v| v / length).collect()
     }

@@ -138,13 +138,13 @@ impl Model {
     pub fn decision(&self, patch: &Patch) -> f64 {
         let patch = quantised_patch(patch);
         let per_square = f64::from(self.gamma) * std::f64::consts::LOG2_E;
+        let each = self.vectors.iter().zip(&self.steps).zip(&self.squares);
         // |a - b|² from the stored squares costs one scalar product.
-        let exponent = |((vector, step), square): ((&[i8; PADDED], &f32), &f64)| {
+        let exponents = each.map(|((vector, step), square)| {
             let product = f64::from(dot(vector, &patch.values)) * f64::from(*step) * patch.step;
             per_square * (2.0 * product - square - patch.square)
-        };
-        let each = self.vectors.iter().zip(&self.steps).zip(&self.squares);
-        let exponents: Vec<f64> = each.map(exponent).collect();
+        });
+        let exponents: Vec<f64> = exponents.collect();
         weighted_powers(&exponents, &self.weights) + f64::from(self.bias)
     }
 
@@ -292,16 +292,14 @@ mod tests {
 
     /// The sum by its definition, in double precision.
     fn slow(model: &Model, x: &Patch) -> f64 {
-        let kernel = |v: &[f32]| {
-            let distance: f64 =
-                v.iter().zip(x).map(|(v, x)| (f64::from(*v) - f64::from(*x)).powi(2)).sum();
-            (-f64::from(model.gamma) * distance).exp()
-        };
-        let value = |k: usize, v: &i8| model.steps[k] * f32::from(*v);
-        let vector = |k: usize| model.vectors[k].iter().map(move |v| value(k, v));
-        let kernels = (0..model.len()).map(|k| kernel(&vector(k).take(PIXELS).collect::<Vec<_>>()));
-        let each = kernels.zip(&model.weights);
-        each.map(|(kernel, w)| f64::from(*w) * kernel).sum::<f64>() + f64::from(model.bias)
+        let mut sum = 0.0;
+        for ((vector, step), weight) in model.vectors.iter().zip(&model.steps).zip(&model.weights) {
+            let differences =
+                vector.iter().zip(x).map(|(v, x)| f64::from(step * f32::from(*v)) - f64::from(*x));
+            let distance: f64 = differences.map(|off| off.powi(2)).sum();
+            sum += f64::from(*weight) * (-f64::from(model.gamma) * distance).exp();
+        }
+        sum + f64::from(model.bias)
     }
 
     proptest! {

@@ -58,12 +58,13 @@ fn sum_of(greys: &[u8]) -> u64 {
 
 /// Returns the pixel range of each of the 20 cells along one axis, at least one pixel each.
 fn cells(start: f64, length: f64, size: usize) -> [(usize, usize); SIDE] {
-    let edge = |k: usize| (start + length * k as f64 / SIDE as f64).clamp(0.0, size as f64);
+    let edges: [f64; SIDE + 1] =
+        std::array::from_fn(|k| (start + length * k as f64 / SIDE as f64).clamp(0.0, size as f64));
     std::array::from_fn(|k| {
         // Cells outside the image collapse to its first or last pixel, which continues the
         // border.
-        let first = (edge(k) as usize).min(size - 1);
-        (first, (edge(k + 1) as usize).clamp(first + 1, size))
+        let first = (edges[k] as usize).min(size - 1);
+        (first, (edges[k + 1] as usize).clamp(first + 1, size))
     })
 }
 

@@ -126,13 +126,13 @@ mod training {
             ("grow", |t, ok| t.grow = if ok { 2.0 } else { 2.01 }),
         ];
         for (key, change) in changes {
-            let refusal = |ok| {
+            let [right, wrong] = [true, false].map(|ok| {
                 let mut training = small();
                 change(&mut training, ok);
                 PatchTrainer::new(training, 1).err().map(|error| error.to_string())
-            };
-            assert_eq!(refusal(true), None);
-            assert!(refusal(false).unwrap().contains(&format!("`{key}`")), "{key}");
+            });
+            assert_eq!(right, None);
+            assert!(wrong.unwrap().contains(&format!("`{key}`")), "{key}");
         }
     }
 
@@ -146,8 +146,9 @@ mod training {
     }
 
     fn spread(trial: &Trial) -> f64 {
-        let values = || trial.held_out.iter().map(|(f, _)| *f);
-        values().fold(f64::MIN, f64::max) - values().fold(f64::MAX, f64::min)
+        let values: Vec<f64> = trial.held_out.iter().map(|(f, _)| *f).collect();
+        let most = values.iter().copied().fold(f64::MIN, f64::max);
+        most - values.iter().copied().fold(f64::MAX, f64::min)
     }
 
     /// As printed: gamma = 8 on grey values from 0 to 255. All patches are so far from each other

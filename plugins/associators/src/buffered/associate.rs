@@ -63,12 +63,9 @@ impl Buffered {
 
 impl Associator for Buffered {
     fn fits(&self, track: &Track, detection: &Detection, _: &Gate) -> bool {
-        let fits = |reach| self.overlap(track, detection, reach).is_some();
-        if self.is_strong(detection) {
-            fits(self.first()) || fits(self.second())
-        } else {
-            fits(self.weak())
-        }
+        let reaches: &[Reach] =
+            if self.is_strong(detection) { &[self.first(), self.second()] } else { &[self.weak()] };
+        reaches.iter().any(|reach| self.overlap(track, detection, *reach).is_some())
     }
 
     fn associate(
@@ -78,27 +75,26 @@ impl Associator for Buffered {
         gate: &Gate,
     ) -> Associations {
         self.memory.begin(tracks, gate.dt_s);
-        let this = &*self;
-        let strong = |at: usize| this.is_strong(&detections[at]);
-        let similarity = |reach: Reach| {
-            move |row: usize, column: usize| {
-                let track = &tracks[row];
-                let detection = &detections[column];
-                let overlap = this.overlap(track, detection, reach)?;
-                let log_ratio = gate.appearance_of(row, column);
-                let counted = this.config.stages.similarity(overlap, detection, log_ratio);
-                gate.admits(track, detection).then_some(counted)
-            }
-        };
         let mut staged = Staged::new(tracks.len(), detections.len());
         for confirmed in [true, false] {
-            let confirmed_first = this.config.stages.confirmed_first;
-            let turn = |at: usize| !confirmed_first || tracks[at].confirmed == confirmed;
-            staged.assign(&staged.open(turn, strong), similarity(this.first()));
-            staged.assign(&staged.open(turn, strong), similarity(this.second()));
-            staged.assign(&staged.open(turn, |at| !strong(at)), similarity(this.weak()));
+            for (strong, reach) in
+                [(true, self.first()), (true, self.second()), (false, self.weak())]
+            {
+                let stage = staged.open(
+                    |at| !self.config.stages.confirmed_first || tracks[at].confirmed == confirmed,
+                    |at| self.is_strong(&detections[at]) == strong,
+                );
+                staged.assign(&stage, |row, column| {
+                    let track = &tracks[row];
+                    let detection = &detections[column];
+                    let overlap = self.overlap(track, detection, reach)?;
+                    let log_ratio = gate.appearance_of(row, column);
+                    let counted = self.config.stages.similarity(overlap, detection, log_ratio);
+                    gate.admits(track, detection).then_some(counted)
+                });
+            }
         }
-        let spent = staged.left(|at| !strong(at));
+        let spent = staged.left(|at| !self.is_strong(&detections[at]));
         for (track, given) in tracks.iter().zip(staged.given()) {
             if let Some(region) = given.and_then(|given| detections[given].rect()) {
                 self.memory.record(track.id, region);
@@ -166,41 +162,39 @@ mod tests {
     #[test]
     fn the_better_of_overlap_and_appearance_counts() {
         let found = [detection(2.0, 3.0), detection(8.0, 3.0)];
-        let with = |appearance: &[Vec<f64>]| {
+        let looks = [vec![0.0, 6.0]];
+        for (appearance, expected) in [(&[][..], (0, 0)), (&looks, (0, 1))] {
             let gate = GATE.with_appearance(appearance);
             let mut associator = Buffered::new(Config::default()).unwrap();
-            pairs(&associator.associate(&[track(1, 0.0)], &found, &gate))
-        };
-        assert_eq!((with(&[]), with(&[vec![0.0, 6.0]])), (vec![(0, 0)], vec![(0, 1)]));
+            assert_eq!(pairs(&associator.associate(&[track(1, 0.0)], &found, &gate)), [expected]);
+        }
     }
 
     /// The nearer detection looks like another person.
     #[test]
     fn a_sum_lets_the_appearance_speak_against_a_pair() {
         let found = [detection(2.0, 3.0), detection(8.0, 3.0)];
-        let with = |fusion: Fusion| {
-            let appearance = [vec![-6.0, 0.0]];
+        let appearance = [vec![-6.0, 0.0]];
+        for (fusion, expected) in [(Fusion::Minimum, (0, 0)), (Fusion::Sum, (0, 1))] {
             let gate = GATE.with_appearance(&appearance);
             let stages = StageSettings { fusion, ..StageSettings::default() };
             let config = Config { stages, ..Config::default() };
             let mut associator = Buffered::new(config).unwrap();
-            pairs(&associator.associate(&[track(1, 0.0)], &found, &gate))
-        };
-        assert_eq!((with(Fusion::Minimum), with(Fusion::Sum)), (vec![(0, 0)], vec![(0, 1)]));
+            assert_eq!(pairs(&associator.associate(&[track(1, 0.0)], &found, &gate)), [expected]);
+        }
     }
 
     #[test]
     fn the_appearance_counts_for_boxes_that_overlap_enough() {
         let found = [detection(2.0, 3.0), detection(8.0, 3.0)];
-        let with = |fusion_gate: f64| {
-            let appearance = [vec![0.0, 6.0]];
+        let appearance = [vec![0.0, 6.0]];
+        for (fusion_gate, expected) in [(0.5, (0, 1)), (0.9, (0, 0))] {
             let gate = GATE.with_appearance(&appearance);
             let stages = StageSettings { fusion_gate, ..StageSettings::default() };
             let config = Config { stages, ..Config::default() };
             let mut associator = Buffered::new(config).unwrap();
-            pairs(&associator.associate(&[track(1, 0.0)], &found, &gate))
-        };
-        assert_eq!((with(0.5), with(0.9)), (vec![(0, 1)], vec![(0, 0)]));
+            assert_eq!(pairs(&associator.associate(&[track(1, 0.0)], &found, &gate)), [expected]);
+        }
     }
 
     /// The track goes 8 pixels a frame; the filter has not noticed.
@@ -224,35 +218,33 @@ mod tests {
     #[test]
     fn a_weak_detection_continues_a_track_and_starts_none() {
         let found = [detection(1.0, 0.1), detection(90.0, 0.1)];
-        let with = |weak_overlap: f64| {
+        for (weak_overlap, expected, spent) in
+            [(0.5, vec![(0, 0)], vec![1]), (1.5, vec![], vec![0, 1])]
+        {
             let config = Config { weak_overlap, ..Config::default() };
             let answer = answer(&config, &[track(1, 0.0)], &found);
-            (pairs(&answer), answer.spent)
-        };
-        assert_eq!(with(0.5), (vec![(0, 0)], vec![1]));
-        assert_eq!(with(1.5), (vec![], vec![0, 1]));
+            assert_eq!((pairs(&answer), answer.spent), (expected, spent));
+        }
     }
 
     #[test]
     fn confirmed_tracks_may_go_first() {
         let tracks = [track(1, 6.0), track(2, 0.0).with_confirmed(false)];
-        let with = |confirmed_first: bool| {
+        for (confirmed_first, expected) in [(false, (1, 0)), (true, (0, 0))] {
             let stages = StageSettings { confirmed_first, ..StageSettings::default() };
             let config = Config { stages, ..Config::default() };
-            pairs(&answer(&config, &tracks, &[detection(0.0, 3.0)]))
-        };
-        assert_eq!((with(false), with(true)), (vec![(1, 0)], vec![(0, 0)]));
+            assert_eq!(pairs(&answer(&config, &tracks, &[detection(0.0, 3.0)])), [expected]);
+        }
     }
 
     #[test]
     fn overlap_may_count_by_the_score() {
         let found = [detection(0.0, 0.5), detection(2.0, 5.0)];
-        let with = |weigh_by_score: bool| {
+        for (weigh_by_score, expected) in [(false, (0, 0)), (true, (0, 1))] {
             let stages = StageSettings { weigh_by_score, ..StageSettings::default() };
             let config = Config { stages, ..Config::default() };
-            pairs(&answer(&config, &[track(1, 0.0)], &found))
-        };
-        assert_eq!((with(false), with(true)), (vec![(0, 0)], vec![(0, 1)]));
+            assert_eq!(pairs(&answer(&config, &[track(1, 0.0)], &found)), [expected]);
+        }
     }
 
     #[test]

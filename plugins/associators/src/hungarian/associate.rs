@@ -65,11 +65,11 @@ mod tests {
         let mut hungarian = Hungarian::new(Config::default()).unwrap();
         let doubtful = detection_at(3.0, 0.0).with_score(-2.0);
         let at = track(3.0, 0.0, 0.01);
-        let mut pairs = |score: f64| {
+        for (score, expected) in [(1.9, 0), (2.1, 1)] {
             let track = at.clone().with_score(score);
-            hungarian.associate(&[track], std::slice::from_ref(&doubtful), &GATE).pairs.len()
-        };
-        assert_eq!((pairs(1.9), pairs(2.1)), (0, 1), "log-odds add up");
+            let answer = hungarian.associate(&[track], std::slice::from_ref(&doubtful), &GATE);
+            assert_eq!(answer.pairs.len(), expected, "log-odds add up");
+        }
     }
 
     #[test]
@@ -77,13 +77,17 @@ mod tests {
         let mut hungarian = Hungarian::new(Config::default()).unwrap();
         let tracks = [0.1, -0.1].map(|y| track(3.0, y, 0.02));
         let seen = [detection_at(3.0, 0.11), detection_at(3.0, -0.11)];
-        let mut given = |appearance: &[Vec<f64>]| {
-            let answer = hungarian.associate(&tracks, &seen, &GATE.with_appearance(appearance));
-            pairs(&answer).into_iter().map(|(_, detection)| detection).collect::<Vec<_>>()
-        };
-        assert_eq!(given(&[]), [0, 1]);
-        assert_eq!(given(&[vec![-4.0, 4.0], vec![4.0, -4.0]]), [1, 0]);
-        assert_eq!(given(&[vec![-0.1, 0.1], vec![0.1, -0.1]]), [0, 1], "places still count");
+        for (appearance, expected) in [
+            (vec![], [0, 1]),
+            (vec![vec![-4.0, 4.0], vec![4.0, -4.0]], [1, 0]),
+            // Places still count.
+            (vec![vec![-0.1, 0.1], vec![0.1, -0.1]], [0, 1]),
+        ] {
+            let answer = hungarian.associate(&tracks, &seen, &GATE.with_appearance(&appearance));
+            let given: Vec<_> =
+                pairs(&answer).into_iter().map(|(_, detection)| detection).collect();
+            assert_eq!(given, expected, "{appearance:?}");
+        }
     }
 
     /// Both detections are near the first track, and the farther one looks like it. The second track
@@ -97,15 +101,19 @@ mod tests {
         let tracks = [track_in(1, boxed(0.0)), track_in(2, boxed(2.0))];
         let seen = [1.0, 4.0].map(|x| detection_in(boxed(x)));
         let looks = [vec![-3.0, 6.0], vec![-3.0, -3.0]];
-        let given = |fusion: Fusion, fusion_gate: f64| {
+        for (fusion, fusion_gate, expected) in [
+            (Fusion::Minimum, 0.5, vec![(0, 1), (1, 0)]),
+            // Too little overlap.
+            (Fusion::Minimum, 0.9, vec![(0, 0), (1, 1)]),
+            // Other looks speak against the second pair.
+            (Fusion::Sum, 0.5, vec![(0, 1)]),
+        ] {
             let gating = GateSettings { fusion, fusion_gate, ..GateSettings::default() };
             let config = Config { cost: Cost::Overlap, gating, ..Config::default() };
             let gate = GATE.with_appearance(&looks);
-            pairs(&Hungarian::new(config).unwrap().associate(&tracks, &seen, &gate))
-        };
-        assert_eq!(given(Fusion::Minimum, 0.5), [(0, 1), (1, 0)]);
-        assert_eq!(given(Fusion::Minimum, 0.9), [(0, 0), (1, 1)], "too little overlap");
-        assert_eq!(given(Fusion::Sum, 0.5), [(0, 1)], "other looks speak against the second pair");
+            let mut hungarian = Hungarian::new(config).unwrap();
+            assert_eq!(pairs(&hungarian.associate(&tracks, &seen, &gate)), expected);
+        }
     }
 
     #[test]

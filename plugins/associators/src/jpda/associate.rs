@@ -37,10 +37,11 @@ impl Jpda {
         let mut all = cluster.detections.clone();
         let most = self.config.max_detections as usize;
         if all.len() > most {
-            let best = |detection: &usize| {
-                cluster.tracks.iter().map(|track| ratios[*track][*detection]).fold(0.0, f64::max)
-            };
-            all.sort_by(|a, b| best(b).total_cmp(&best(a)).then(a.cmp(b)));
+            all.sort_by(|a, b| {
+                let [of_a, of_b] =
+                    [*a, *b].map(|detection| largest_ratio(cluster, ratios, detection));
+                of_b.total_cmp(&of_a).then(a.cmp(b))
+            });
             all.truncate(most);
             all.sort_unstable();
         }
@@ -96,6 +97,11 @@ impl Associator for Jpda {
     }
 }
 
+/// Returns the largest likelihood ratio of a detection with the tracks of a cluster.
+fn largest_ratio(cluster: &Cluster, ratios: &[Vec<f64>], detection: usize) -> f64 {
+    cluster.tracks.iter().map(|track| ratios[*track][detection]).fold(0.0, f64::max)
+}
+
 #[cfg(test)]
 mod tests {
     use crate::{Fusion, GateSettings};
@@ -144,18 +150,15 @@ mod tests {
     #[test]
     fn an_appearance_may_help_a_pair_and_not_harm_the_other() {
         let tracks = [track(1, -0.2), track(2, 0.2)];
-        let weights = |looks: [f64; 2]| {
+        for (look, least, most) in [(5.0, 0.1, 1.0), (-5.0, -1e-9, 1e-9)] {
             let gating = GateSettings { fusion: Fusion::Minimum, ..GateSettings::default() };
             let config = Config { gating, ..Config::default() };
-            let looks = looks.map(|look| vec![look]);
+            let looks = [vec![look], vec![0.0]];
             let gate = GATE.with_appearance(&looks);
             let answer = Jpda::new(config).unwrap().associate(&tracks, &[detection(0.0)], &gate);
-            [0, 1].map(|at| answer.pairs[at].weight)
-        };
-        let [helped, other] = weights([5.0, 0.0]);
-        assert!(helped > other + 0.1, "{helped} {other}");
-        let [a, b] = weights([-5.0, 0.0]);
-        assert!((a - b).abs() < 1e-9, "{a} {b}");
+            let lead = answer.pairs[0].weight - answer.pairs[1].weight;
+            assert!(least < lead && lead < most, "{look}: {lead}");
+        }
     }
 
     #[test]

@@ -9,17 +9,18 @@ pub(crate) fn marginals(likelihoods: &[Vec<f64>], detections: usize) -> Vec<Vec<
     behind.reverse();
     let full = (1_usize << detections) - 1;
     let total: f64 = ahead[likelihoods.len()].iter().sum();
-    let weight = |track: usize, detection: usize| {
+    let mut weights = vec![vec![0.0; detections]; likelihoods.len()];
+    for (track, row) in weights.iter_mut().enumerate() {
         let used = &ahead[track];
-        let bit = 1 << detection;
-        let events = (0..=full)
-            .filter(|set| set & bit == 0)
-            .map(|set| used[set] * sum_of_subsets(&behind[track + 1], full & !(set | bit)));
-        likelihoods[track][detection] * events.sum::<f64>() / total
-    };
-    (0..likelihoods.len())
-        .map(|track| (0..detections).map(|detection| weight(track, detection)).collect())
-        .collect()
+        for (detection, weight) in row.iter_mut().enumerate() {
+            let bit = 1 << detection;
+            let events = (0..=full)
+                .filter(|set| set & bit == 0)
+                .map(|set| used[set] * sum_of_subsets(&behind[track + 1], full & !(set | bit)));
+            *weight = likelihoods[track][detection] * events.sum::<f64>() / total;
+        }
+    }
+    weights
 }
 
 /// Returns, for 0, 1, ... tracks in this order, the sum of the weights of all events of these

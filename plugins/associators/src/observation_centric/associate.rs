@@ -13,6 +13,19 @@ pub struct ObservationCentric {
     memory: ObservationMemory,
 }
 
+/// Assignments, in their order.
+#[derive(Clone, Copy, PartialEq)]
+enum Round {
+    /// Strong detections, to the tracks that go first.
+    Early,
+    /// Weak detections, to the tracks that are left of them.
+    Weak,
+    /// Strong detections, by the boxes at which the tracks were last observed.
+    Recovery,
+    /// Strong detections, to all other tracks.
+    Late,
+}
+
 /// Tracks and detections of one frame.
 struct Scene<'a> {
     tracks: &'a [Track],
@@ -93,23 +106,26 @@ impl Associator for ObservationCentric {
         self.memory.begin(tracks, gate.dt_s);
         let scene = Scene { tracks, detections, gate };
         let stages = self.config.stages;
-        let strong = |at: usize| stages.is_strong(&detections[at]);
-        let early = |at: usize| tracks[at].confirmed || !stages.confirmed_first;
-        let by_prediction = |row, column| self.similarity(&scene, row, column);
         let mut staged = Staged::new(tracks.len(), detections.len());
-        staged.assign(&staged.open(early, strong), by_prediction);
-        staged.assign(&staged.open(early, |at| !strong(at)), by_prediction);
-        staged.assign(&staged.open(early, strong), |row, column| {
-            let (track, detection) = scene.pair(row, column)?;
-            self.recovered(track, detection)
-        });
-        staged.assign(&staged.open(|_| true, strong), by_prediction);
+        for round in [Round::Early, Round::Weak, Round::Recovery, Round::Late] {
+            let stage = staged.open(
+                |at| round == Round::Late || tracks[at].confirmed || !stages.confirmed_first,
+                |at| stages.is_strong(&detections[at]) == (round != Round::Weak),
+            );
+            staged.assign(&stage, |row, column| {
+                if round == Round::Recovery {
+                    let (track, detection) = scene.pair(row, column)?;
+                    return self.recovered(track, detection);
+                }
+                self.similarity(&scene, row, column)
+            });
+        }
         for (track, given) in tracks.iter().zip(staged.given()) {
             if let Some(region) = given.and_then(|given| detections[given].rect()) {
                 self.memory.record(track.id, region);
             }
         }
-        let spent = staged.left(|at| !strong(at));
+        let spent = staged.left(|at| !stages.is_strong(&detections[at]));
         Associations::one_to_one(staged.given().iter().copied()).with_spent(spent)
     }
 }
@@ -147,12 +163,11 @@ mod tests {
     #[test]
     fn a_detection_straight_ahead_goes_before_one_beside_the_way() {
         let detections = [detection(at(14.0, 10.0), 3.0), detection(at(23.0, 0.0), 3.0)];
-        let with = |direction_weight: f64| {
+        for (direction_weight, expected) in [(0.0, (0, 0)), (0.2, (0, 1))] {
             let mut associator = walking(Config { direction_weight, ..Config::default() });
-            pairs(&associator.associate(&[track_in(1, at(16.0, 0.0))], &detections, &GATE))
-        };
-        assert_eq!(with(0.0), [(0, 0)]);
-        assert_eq!(with(0.2), [(0, 1)]);
+            let answer = associator.associate(&[track_in(1, at(16.0, 0.0))], &detections, &GATE);
+            assert_eq!(pairs(&answer), [expected]);
+        }
     }
 
     /// The direction speaks for the left one of equal overlap only as far as the detection is sure.
@@ -194,12 +209,18 @@ mod tests {
     #[test]
     fn directions_are_compared_as_the_paper_has_them() {
         let associator = walking(Config::default());
-        let toward = |x: f64, y: f64| associator.consistency(&track_in(1, at(0.0, 0.0)), &at(x, y));
         // The direction is taken from the observation three frames ago, at x = 4.
-        assert!((toward(14.0, 0.0) - 0.5).abs() < 1e-9, "straight ahead");
-        assert!((toward(-6.0, 0.0) + 0.5).abs() < 1e-9, "straight behind");
-        assert!(toward(4.0, 10.0).abs() < 1e-9, "across");
-        assert_eq!(toward(4.0, 0.0), 0.0, "from where it was there is no direction");
+        for (x, y, expected) in [
+            (14.0, 0.0, 0.5),
+            (-6.0, 0.0, -0.5),
+            // Across.
+            (4.0, 10.0, 0.0),
+            // From where it was there is no direction.
+            (4.0, 0.0, 0.0),
+        ] {
+            let found = associator.consistency(&track_in(1, at(0.0, 0.0)), &at(x, y));
+            assert!((found - expected).abs() < 1e-9, "{x} {y}: {found}");
+        }
         assert_eq!(associator.consistency(&track_in(2, at(0.0, 0.0)), &at(9.0, 0.0)), 0.0);
     }
 
@@ -207,77 +228,77 @@ mod tests {
     #[test]
     fn a_track_that_no_detection_overlaps_is_found_where_it_was_last_observed() {
         let there = [detection(at(12.0, 0.0), 3.0)];
-        let answer = |config: Config| {
-            pairs(&walking(config).associate(&[track_in(1, at(60.0, 0.0))], &there, &GATE))
-        };
-        assert_eq!(answer(Config::default()), [(0, 0)]);
-        assert_eq!(answer(Config { recovery_overlap: 1.5, ..Config::default() }), []);
+        for (recovery_overlap, expected) in
+            [(Config::default().recovery_overlap, vec![(0, 0)]), (1.5, vec![])]
+        {
+            let mut associator = walking(Config { recovery_overlap, ..Config::default() });
+            let answer = associator.associate(&[track_in(1, at(60.0, 0.0))], &there, &GATE);
+            assert_eq!(pairs(&answer), expected);
+        }
         let near = [detection(at(36.0, 0.0), 3.0)];
-        let answer = |recovery_buffer: f64| {
+        for (recovery_buffer, expected) in [(0.0, vec![]), (1.0, vec![(0, 0)])] {
             let mut associator = walking(Config { recovery_buffer, ..Config::default() });
-            pairs(&associator.associate(&[track_in(1, at(80.0, 0.0))], &near, &GATE))
-        };
-        assert_eq!((answer(0.0), answer(1.0)), (vec![], vec![(0, 0)]));
+            let answer = associator.associate(&[track_in(1, at(80.0, 0.0))], &near, &GATE);
+            assert_eq!(pairs(&answer), expected);
+        }
     }
 
     #[test]
     fn a_weak_detection_continues_a_track_and_starts_none() {
         let weak = [detection(at(13.0, 0.0), 0.1), detection(at(90.0, 0.0), 0.1)];
-        let answer = |weak_overlap: f64| {
-            let config = Config { weak_overlap, ..Config::default() };
-            let answer = walking(config).associate(&[track_in(1, at(12.0, 0.0))], &weak, &GATE);
-            (pairs(&answer), answer.spent)
-        };
-        assert_eq!(answer(0.5), (vec![(0, 0)], vec![1]));
-        assert_eq!(answer(1.5), (vec![], vec![0, 1]));
+        for (weak_overlap, expected, spent) in
+            [(0.5, vec![(0, 0)], vec![1]), (1.5, vec![], vec![0, 1])]
+        {
+            let mut associator = walking(Config { weak_overlap, ..Config::default() });
+            let answer = associator.associate(&[track_in(1, at(12.0, 0.0))], &weak, &GATE);
+            assert_eq!((pairs(&answer), answer.spent), (expected, spent));
+        }
     }
 
     #[test]
     fn confirmed_tracks_may_go_first() {
         let tracks = [track_in(1, at(6.0, 0.0)), track_in(2, at(0.0, 0.0)).with_confirmed(false)];
         let found = [detection(at(0.0, 0.0), 3.0)];
-        let answer = |confirmed_first: bool| {
+        for (confirmed_first, expected) in [(false, (1, 0)), (true, (0, 0))] {
             let stages = StageSettings { confirmed_first, ..StageSettings::default() };
             let config = Config { stages, ..Config::default() };
-            pairs(&associator(config).associate(&tracks, &found, &GATE))
-        };
-        assert_eq!((answer(false), answer(true)), (vec![(1, 0)], vec![(0, 0)]));
+            assert_eq!(pairs(&associator(config).associate(&tracks, &found, &GATE)), [expected]);
+        }
     }
 
     #[test]
     fn overlap_may_count_by_the_score() {
         let found = [detection(at(0.0, 0.0), 0.5), detection(at(2.0, 0.0), 5.0)];
-        let answer = |weigh_by_score: bool| {
+        for (weigh_by_score, expected) in [(false, (0, 0)), (true, (0, 1))] {
             let stages = StageSettings { weigh_by_score, ..StageSettings::default() };
-            let config = Config { stages, ..Config::default() };
-            pairs(&associator(config).associate(&[track_in(1, at(0.0, 0.0))], &found, &GATE))
-        };
-        assert_eq!((answer(false), answer(true)), (vec![(0, 0)], vec![(0, 1)]));
+            let mut associator = associator(Config { stages, ..Config::default() });
+            let answer = associator.associate(&[track_in(1, at(0.0, 0.0))], &found, &GATE);
+            assert_eq!(pairs(&answer), [expected]);
+        }
     }
 
     #[test]
     fn appearance_helps_a_pair_within_the_gate() {
         let found = [detection(at(0.0, 0.0), 3.0), detection(at(5.0, 0.0), 3.0)];
         let appearance = [vec![-2.0, 4.0]];
-        let answer = |gate: &Gate| {
+        for (gate, expected) in [(GATE, (0, 0)), (GATE.with_appearance(&appearance), (0, 1))] {
             let mut associator = associator(Config::default());
-            pairs(&associator.associate(&[track_in(1, at(1.0, 0.0))], &found, gate))
-        };
-        assert_eq!(answer(&GATE), [(0, 0)]);
-        assert_eq!(answer(&GATE.with_appearance(&appearance)), [(0, 1)]);
+            let answer = associator.associate(&[track_in(1, at(1.0, 0.0))], &found, &gate);
+            assert_eq!(pairs(&answer), [expected]);
+        }
     }
 
     #[test]
     fn a_sum_lets_the_appearance_speak_against_a_pair() {
         let found = [detection(at(0.0, 0.0), 3.0), detection(at(5.0, 0.0), 3.0)];
         let appearance = [vec![-4.0, 0.0]];
-        let answer = |fusion: Fusion| {
+        for (fusion, expected) in [(Fusion::Minimum, (0, 0)), (Fusion::Sum, (0, 1))] {
             let stages = StageSettings { fusion, ..StageSettings::default() };
             let mut associator = associator(Config { stages, ..Config::default() });
             let gate = GATE.with_appearance(&appearance);
-            pairs(&associator.associate(&[track_in(1, at(1.0, 0.0))], &found, &gate))
-        };
-        assert_eq!((answer(Fusion::Minimum), answer(Fusion::Sum)), (vec![(0, 0)], vec![(0, 1)]));
+            let answer = associator.associate(&[track_in(1, at(1.0, 0.0))], &found, &gate);
+            assert_eq!(pairs(&answer), [expected]);
+        }
     }
 
     #[test]

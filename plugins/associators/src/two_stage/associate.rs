@@ -113,8 +113,9 @@ mod tests {
     #[test]
     fn a_weak_detection_has_to_fit_better() {
         let two_stage = TwoStage::new(Config::default()).unwrap();
-        let fits = |score: f64| two_stage.fits(&track(1, 0.0), &detection(0.4, score), &GATE);
-        assert!(fits(3.0) && !fits(0.2));
+        for (score, fits) in [(3.0, true), (0.2, false)] {
+            assert_eq!(two_stage.fits(&track(1, 0.0), &detection(0.4, score), &GATE), fits);
+        }
     }
 
     /// The detections are in front of the wrong tracks by 6 cm, and look like the right ones.
@@ -123,17 +124,20 @@ mod tests {
         let tracks = [track(1, 0.0), track(2, 0.2)];
         let found = [detection(0.13, 3.0), detection(0.07, 3.0)];
         let looks = [vec![4.0, -4.0], vec![-4.0, 4.0]];
-        let given = |appearance, fusion_gate: f64| {
+        for (appearance, fusion_gate, expected) in [
+            (&[][..], 0.0, [(0, 1), (1, 0)]),
+            (&looks, 0.0, [(0, 0), (1, 1)]),
+            // exp(-d²/2) is less than that.
+            (&looks, 0.95, [(0, 1), (1, 0)]),
+        ] {
             let fusion = Fusion::Minimum;
             let gating = GateSettings { fusion, fusion_gate, ..GateSettings::default() };
             let settings = hungarian::Config { gating, ..hungarian::Config::default() };
             let config = Config { pairs: settings, ..Config::default() };
             let gate = GATE.with_appearance(appearance);
-            pairs(&TwoStage::new(config).unwrap().associate(&tracks, &found, &gate))
-        };
-        assert_eq!(given(&[], 0.0), [(0, 1), (1, 0)]);
-        assert_eq!(given(&looks, 0.0), [(0, 0), (1, 1)]);
-        assert_eq!(given(&looks, 0.95), [(0, 1), (1, 0)], "exp(-d²/2) is less than that");
+            let answer = TwoStage::new(config).unwrap().associate(&tracks, &found, &gate);
+            assert_eq!(pairs(&answer), expected);
+        }
     }
 
     #[test]

@@ -75,22 +75,26 @@ impl NetTrainer {
     /// `share` is that of people.
     fn gradient(&self, net: &Net, batch: &[usize], share: f32, seed: u64) -> Result<Net> {
         let chunks: Vec<&[usize]> = batch.chunks(batch.len().div_ceil(PARTS)).collect();
-        let of_part = |part: &&[usize]| {
-            let mut gradient = Net::default();
-            let mut pass = Pass::default();
-            for &k in *part {
-                let is_person = self.examples[k].is_person;
-                let view = changed(&self.views[k], &mut Draws(mix(seed ^ !(k as u64))));
-                let said = net.look(&view, &mut pass);
-                let target = if is_person { SURE } else { 1.0 - SURE };
-                let weight = 0.5 / if is_person { share } else { 1.0 - share };
-                let of_output = (1.0 / (1.0 + (-said).exp()) - target) * weight;
-                net.learn(&pass, of_output / batch.len() as f32, &mut gradient);
-            }
-            Ok(gradient)
-        };
+        let gradients = side_by_side(
+            &chunks,
+            |part| {
+                let mut gradient = Net::default();
+                let mut pass = Pass::default();
+                for &k in *part {
+                    let is_person = self.examples[k].is_person;
+                    let view = changed(&self.views[k], &mut Draws(mix(seed ^ !(k as u64))));
+                    let said = net.look(&view, &mut pass);
+                    let target = if is_person { SURE } else { 1.0 - SURE };
+                    let weight = 0.5 / if is_person { share } else { 1.0 - share };
+                    let of_output = (1.0 / (1.0 + (-said).exp()) - target) * weight;
+                    net.learn(&pass, of_output / batch.len() as f32, &mut gradient);
+                }
+                Ok(gradient)
+            },
+            &mut |_| {},
+        )?;
         let mut sum = Net::default();
-        for part in side_by_side(&chunks, of_part, &mut |_| {})? {
+        for part in gradients {
             let pairs =
                 sum.parts_mut().into_iter().flatten().zip(part.parts().into_iter().flatten());
             pairs.for_each(|(sum, value)| *sum += value);
@@ -109,8 +113,10 @@ impl NetTrainer {
                 .partition(|k| parts.get(&self.examples[*k].group) == Some(&fold));
             let net =
                 self.network(&rest, &mut |part| progress((fold as f64 + part) / folds as f64))?;
-            let look = |k: usize, pass: &mut Pass| f64::from(net.look(&self.views[k], pass));
-            said.extend(out.iter().map(|&k| (look(k, &mut pass), self.examples[k].is_person)));
+            for k in out {
+                let log_odds = f64::from(net.look(&self.views[k], &mut pass));
+                said.push((log_odds, self.examples[k].is_person));
+            }
         }
         Ok(said)
     }
@@ -216,13 +222,17 @@ mod tests {
     #[test]
     fn people_and_others_weigh_the_same_whatever_their_number() {
         let trainer = trainer(3, 1);
-        let bias = |batch: &[usize], share: f32| {
-            trainer.gradient(&Net::default(), batch, share, 1).unwrap().bias[0]
-        };
-        assert!(bias(&[0, 1, 2, 3], 0.75).abs() < 1e-6);
-        assert!((bias(&[0], 0.5) + SURE - 0.5).abs() < 1e-6, "a person");
-        assert!((bias(&[3], 0.5) - SURE + 0.5).abs() < 1e-6, "another thing");
-        assert!((bias(&[3], 0.75) - 2.0 * (SURE - 0.5)).abs() < 1e-6);
+        for (batch, share, expected) in [
+            (&[0, 1, 2, 3][..], 0.75, 0.0),
+            // A person.
+            (&[0], 0.5, 0.5 - SURE),
+            // Another thing.
+            (&[3], 0.5, SURE - 0.5),
+            (&[3], 0.75, 2.0 * (SURE - 0.5)),
+        ] {
+            let gradient = trainer.gradient(&Net::default(), batch, share, 1).unwrap();
+            assert!((gradient.bias[0] - expected).abs() < 1e-6, "{batch:?} {share}");
+        }
     }
 
     #[test]

@@ -70,8 +70,10 @@ mod tests {
         let lens =
             Pinhole { fx: 300.0, fy: 300.0, cx: 160.0, cy: 160.0, distortion: Distortion::None };
         let camera = Camera::mounted(lens, 320, 320, 1.2, 0.0, 0.0);
-        let metres = |pixel: usize| (160.0 - pixel as f64) / 300.0 * ahead_m;
-        let image = GreyImage::from_fn(320, 320, |x, y| paint(metres(x), 1.2 + metres(y)));
+        let image = GreyImage::from_fn(320, 320, |x, y| {
+            let [left, up] = [x, y].map(|pixel| (160.0 - pixel as f64) / 300.0 * ahead_m);
+            paint(left, 1.2 + up)
+        });
         let candidate =
             Detection::new("test", Point3::new(ahead_m, 0.0, 1.6), Matrix3::identity(), 0.0)
                 .with_image(ImageBox::upper_body(Rect::new(140.0, 60.0, 40.0, 40.0)));
@@ -104,12 +106,14 @@ mod tests {
         let near = numbers(1.0, |left, _| if left > 0.0 { 200 } else { 30 });
         let chest = 4 * 6 + 3;
         let feet = 9 * 6 + 3;
-        let of = |block: usize| &near[block * DIRECTIONS..(block + 1) * DIRECTIONS];
-        assert!(of(chest).iter().all(|v| v.is_finite()));
-        assert!(of(feet).iter().all(|v| v.is_nan()));
         let strength = &near[BLOCKS * DIRECTIONS..];
-        assert!(strength[feet].is_nan() && strength[BLOCKS + feet].is_nan());
-        assert!(strength[chest].is_finite() && strength[BLOCKS + chest].is_finite());
+        for (block, is_known) in [(chest, true), (feet, false)] {
+            let directions = &near[block * DIRECTIONS..(block + 1) * DIRECTIONS];
+            for value in directions.iter().chain([&strength[block], &strength[BLOCKS + block]]) {
+                assert_eq!(value.is_finite(), is_known);
+                assert_eq!(value.is_nan(), !is_known);
+            }
+        }
     }
 
     #[test]

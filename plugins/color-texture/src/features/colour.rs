@@ -1,5 +1,5 @@
 use super::spread;
-use super::window::{Grid, HEAD, Surface, TORSO, Zone};
+use super::window::{Grid, HEAD, Surface, TORSO};
 
 /// Bins of a histogram of hues.
 const HUES: usize = 6;
@@ -19,16 +19,14 @@ const DARK: f32 = 50.0;
 
 /// Colours of head and torso, where they lie on the candidate in depth.
 pub fn push(colour: &Grid<[f32; 3]>, surface: Option<&Surface>, out: &mut Vec<f32>) {
-    let numbers = |zone: Zone| {
+    let [head, torso] = [HEAD, TORSO].map(|zone| {
         let cells: Vec<[f32; 3]> = zone
             .cells()
             .filter(|cell| surface.is_none_or(|surface| surface.is_on(*cell)))
             .map(|cell| colour[cell])
             .collect();
         zone_numbers(&cells)
-    };
-    let head = numbers(HEAD);
-    let torso = numbers(TORSO);
+    });
     out.extend(head);
     out.extend(torso);
     let hues = head[..HUES].iter().zip(&torso[..HUES]);
@@ -42,7 +40,6 @@ pub fn push(colour: &Grid<[f32; 3]>, surface: Option<&Surface>, out: &mut Vec<f3
 /// spread of the intensity; shares of skin and of dark.
 fn zone_numbers(cells: &[[f32; 3]]) -> [f32; OF_ZONE] {
     let chroma: Vec<[f32; 2]> = cells.iter().map(|c| chromaticity(*c)).collect();
-    let share = |hits: usize| hits as f32 / cells.len() as f32;
     let mut numbers = [0.0; OF_ZONE];
     numbers[..HUES].copy_from_slice(&hues(cells));
     let [red, green] = [0, 1].map(|k| spread(chroma.iter().map(|c| c[k])));
@@ -51,8 +48,10 @@ fn zone_numbers(cells: &[[f32; 3]]) -> [f32; OF_ZONE] {
     let rest = [red, green, saturations].concat();
     numbers[HUES..HUES + 6].copy_from_slice(&rest);
     numbers[HUES + 6] = contrast / 64.0;
-    numbers[HUES + 7] = share(chroma.iter().filter(|c| is_skin(**c)).count());
-    numbers[HUES + 8] = share(cells.iter().filter(|c| intensity(**c) < DARK).count());
+    let skin = chroma.iter().filter(|c| is_skin(**c)).count();
+    let dark = cells.iter().filter(|c| intensity(**c) < DARK).count();
+    numbers[HUES + 7] = skin as f32 / cells.len() as f32;
+    numbers[HUES + 8] = dark as f32 / cells.len() as f32;
     numbers
 }
 

@@ -71,10 +71,8 @@ impl Blocks<'_> {
     fn gradients(&self, row: usize, out: &mut [[f32; 2]]) {
         let columns = self.columns;
         let last = self.grey.len() / self.columns - 1;
-        let line = |row: usize| &self.grey[row * columns..(row + 1) * columns];
-        let above = line(row.saturating_sub(1));
-        let here = line(row);
-        let below = line((row + 1).min(last));
+        let [above, here, below] = [row.saturating_sub(1), row, (row + 1).min(last)]
+            .map(|row| &self.grey[row * columns..(row + 1) * columns]);
         let left = std::iter::once(&here[0]).chain(here);
         let right = here[1..].iter().chain(here.last());
         let across = left.zip(right).map(|(left, right)| 0.5 * (right - left));
@@ -134,18 +132,24 @@ mod tests {
 
     use super::*;
 
+    /// Returns the intensity of a pixel, or of the nearest one of the last row and column.
+    fn intensity_at(blocks: &Blocks<'_>, row: usize, column: usize) -> f32 {
+        let last = blocks.grey.len() / blocks.columns - 1;
+        blocks.grey[row.min(last) * blocks.columns + column.min(blocks.columns - 1)]
+    }
+
     /// Slowly, by the library's functions.
     fn histograms(blocks: &Blocks<'_>) -> Vec<[f32; DIRECTIONS]> {
         let rows = blocks.grey.len() / blocks.columns;
         let columns = blocks.columns;
-        let at = |row: usize, column: usize| {
-            blocks.grey[row.min(rows - 1) * columns + column.min(columns - 1)]
-        };
         let [down, across] = blocks.size();
         let mut histograms = vec![[0.0; DIRECTIONS]; down * across];
         for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |c| (row, c))) {
-            let dx = 0.5 * (at(row, column + 1) - at(row, column.saturating_sub(1)));
-            let dy = 0.5 * (at(row + 1, column) - at(row.saturating_sub(1), column));
+            let [up, left] = [row, column].map(|at| at.saturating_sub(1));
+            let dx =
+                0.5 * (intensity_at(blocks, row, column + 1) - intensity_at(blocks, row, left));
+            let dy =
+                0.5 * (intensity_at(blocks, row + 1, column) - intensity_at(blocks, up, column));
             let turn = dy.atan2(dx).rem_euclid(PI) / PI * DIRECTIONS as f32 - 0.5;
             let first = (turn.floor() as i32).rem_euclid(DIRECTIONS as i32) as usize;
             let part = turn - turn.floor();

@@ -35,10 +35,10 @@ pub fn push(surface: &Surface, out: &mut Vec<f32>) {
 
 /// The run of cells on the candidate about the middle column.
 fn run(surface: &Surface, row: usize) -> (usize, usize) {
-    let is_on = |column: &usize| surface.is_on(row * SIDE + column);
     let middle = SIDE / 2;
-    let right = (middle..SIDE).take_while(is_on).count();
-    let left = (0..middle).rev().take_while(is_on).count();
+    let cells = row * SIDE;
+    let right = (middle..SIDE).take_while(|column| surface.is_on(cells + column)).count();
+    let left = (0..middle).rev().take_while(|column| surface.is_on(cells + column)).count();
     if right == 0 { (middle, middle) } else { (middle - left, middle + right) }
 }
 
@@ -71,25 +71,27 @@ fn block_depth(surface: &Surface, block: usize) -> f32 {
 /// Computes the distance of the candidate's surface from the plane that fits it best, m (root mean
 /// square): zero for posters and cardboard.
 fn unevenness(surface: &Surface, zone: Zone) -> f32 {
-    let points = || {
-        zone.cells().filter(|cell| surface.is_on(*cell)).map(|cell| {
+    let points: Vec<(Vector3<f32>, f32)> = zone
+        .cells()
+        .filter(|cell| surface.is_on(*cell))
+        .map(|cell| {
             let place = Vector3::new((cell % SIDE) as f32 - 15.5, (cell / SIDE) as f32 - 15.5, 1.0);
             (place / 16.0, surface.0[cell])
         })
-    };
+        .collect();
+    // A plane has three parameters; fewer points than 8 fit it by chance.
+    if points.len() < 8 {
+        return f32::NAN;
+    }
     let mut squares = Matrix3::zeros();
     let mut sums = Vector3::zeros();
-    for (place, depth) in points() {
+    for (place, depth) in &points {
         squares += place * place.transpose();
-        sums += place * depth;
-    }
-    // A plane has three parameters; fewer points than 8 fit it by chance.
-    if points().count() < 8 {
-        return f32::NAN;
+        sums += place * *depth;
     }
     let Some(inverse) = squares.try_inverse() else { return f32::NAN };
     let plane = inverse * sums;
-    let [mean, deviation] = spread(points().map(|(place, depth)| depth - plane.dot(&place)));
+    let [mean, deviation] = spread(points.iter().map(|(place, depth)| depth - plane.dot(place)));
     mean.hypot(deviation)
 }
 
@@ -98,11 +100,11 @@ fn roundness(surface: &Surface, zone: Zone) -> f32 {
     let rows = (zone.rows[0]..zone.rows[1]).filter_map(|row| {
         let (left, right) = run(surface, row);
         let part = (right - left) / 4;
-        let mean =
-            |from: usize, to: usize| spread((from..to).map(|c| surface.0[row * SIDE + c]))[0];
         (part > 0).then(|| {
-            (0.5 * (mean(left, left + part) + mean(right - part, right)))
-                - mean(left + part, right - part)
+            let ends = [(left, left + part), (right - part, right), (left + part, right - part)];
+            let [left, right, middle] =
+                ends.map(|(from, to)| spread((from..to).map(|c| surface.0[row * SIDE + c]))[0]);
+            (0.5 * (left + right)) - middle
         })
     });
     spread(rows)[0]
@@ -111,23 +113,26 @@ fn roundness(surface: &Surface, zone: Zone) -> f32 {
 /// Mean bend between neighbours on the candidate, m: leaves are rough.
 fn roughness(surface: &Surface, zone: Zone) -> f32 {
     let inner = Zone { columns: [zone.columns[0] + 1, zone.columns[1] - 1], ..zone };
-    // A bend over an edge of the candidate is that of the background.
-    let all_on = |cell: &usize| [cell - 1, *cell, cell + 1].iter().all(|c| surface.is_on(*c));
-    let d = |cell: usize| surface.0[cell];
-    spread(
-        inner.cells().filter(all_on).map(|cell| (d(cell - 1) - 2.0 * d(cell) + d(cell + 1)).abs()),
-    )[0]
+    let mut bends = Vec::new();
+    for cell in inner.cells() {
+        // A bend over an edge of the candidate is that of the background.
+        if (cell - 1..=cell + 1).all(|cell| surface.is_on(cell)) {
+            let [left, here, right] = [cell - 1, cell, cell + 1].map(|cell| surface.0[cell]);
+            bends.push((left - 2.0 * here + right).abs());
+        }
+    }
+    spread(bends.into_iter())[0]
 }
 
 /// Parts of the window without a reading, on the candidate, nearer.
 fn shares(surface: &Surface) -> [f32; 3] {
     let window = &surface.0[..SIDE * SIDE];
-    let share = |count: usize| count as f32 / window.len() as f32;
     [
-        share(window.iter().filter(|d| d.is_nan()).count()),
-        share((0..window.len()).filter(|cell| surface.is_on(*cell)).count()),
-        share(window.iter().filter(|d| **d < -FAR_M).count()),
+        window.iter().filter(|d| d.is_nan()).count(),
+        (0..window.len()).filter(|cell| surface.is_on(*cell)).count(),
+        window.iter().filter(|d| **d < -FAR_M).count(),
     ]
+    .map(|count| count as f32 / window.len() as f32)
 }
 
 /// Returns the average number of times that a row goes onto the candidate or off it.

@@ -21,8 +21,8 @@ pub fn push(grey: &Grid<f32>, out: &mut Vec<f32>) {
     for zone in [HEAD, TORSO] {
         out.extend(patterns(grey, zone));
     }
-    let of = |zone: Zone| spread(zone.cells().map(|cell| grey[cell]));
-    let ([head, head_spread], [torso, torso_spread]) = (of(HEAD), of(TORSO));
+    let [[head, head_spread], [torso, torso_spread]] =
+        [HEAD, TORSO].map(|zone| spread(zone.cells().map(|cell| grey[cell])));
     let [_, all] = spread(grey.iter().copied());
     let unit = all + NOISE;
     out.extend([head_spread / unit, torso_spread / unit, (head - torso) / unit]);

@@ -90,11 +90,12 @@ impl Window {
 
 /// The pixels of each cell along one axis, at least one a cell.
 fn cells(start: f64, length: f64, size: usize) -> [(usize, usize); SIDE] {
-    let edge = |k: usize| (start + length * k as f64 / SIDE as f64).clamp(0.0, size as f64);
+    let edges: [f64; SIDE + 1] =
+        std::array::from_fn(|k| (start + length * k as f64 / SIDE as f64).clamp(0.0, size as f64));
     std::array::from_fn(|k| {
-        let first = (edge(k) as usize).min(size - 1);
+        let first = (edges[k] as usize).min(size - 1);
         // At least one pixel for a cell, also in small squares.
-        (first, (edge(k + 1) as usize).clamp(first + 1, size))
+        (first, (edges[k + 1] as usize).clamp(first + 1, size))
     })
 }
 
@@ -110,13 +111,12 @@ impl Surface {
         }
 
         let around = region.inflated(GROW);
-        let at = |cell: usize| {
+        let mut cells: [f32; SIDE * ROWS] = std::array::from_fn(|cell| {
             let x = around.x + step(around.width) * ((cell % SIDE) as f64 + 0.5);
             let y = around.y + step(around.height) * ((cell / SIDE) as f64 + 0.5);
             let reading = depth.get(x.floor() as i64, y.floor() as i64).unwrap_or(f32::NAN);
             if reading.is_finite() && reading > 0.0 { reading } else { f32::NAN }
-        };
-        let mut cells: [f32; SIDE * ROWS] = std::array::from_fn(at);
+        });
         let mut head: Vec<f32> = HEAD.cells().map(|c| cells[c]).filter(|d| !d.is_nan()).collect();
         head.sort_by(f32::total_cmp);
         let middle = *head.get(head.len() / 2)?;
@@ -180,9 +180,10 @@ mod tests {
             _ => 2.0 + 0.02 * (x / 2) as f32,
         });
         let surface = Surface::new(&depth, &square).unwrap();
-        let relative = |column: usize, row: usize| surface.0[row * SIDE + column];
-        assert!((relative(20, 4) - relative(10, 4) - 0.2).abs() < 1e-5);
-        assert_eq!(relative(20, 4), relative(20, 40));
-        assert!(relative(31, 2).is_nan() && relative(31, 30).is_nan());
+        let [a, b, c] = [(20, 4), (10, 4), (20, 40)].map(|(x, y)| surface.0[y * SIDE + x]);
+        assert!((a - b - 0.2).abs() < 1e-5);
+        assert_eq!(a, c);
+        let [above, below] = [(31, 2), (31, 30)].map(|(x, y)| surface.0[y * SIDE + x]);
+        assert!(above.is_nan() && below.is_nan());
     }
 }

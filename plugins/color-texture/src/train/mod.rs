@@ -75,15 +75,18 @@ impl TreeTrainer {
         let parts = parts(self.examples.iter().map(|l| l.example), *folds, self.seed);
         let mut trials: Vec<Trial> =
             counts.iter().map(|&trees| Trial { trees, held_out: Vec::new() }).collect();
-        let fold_of = |k: &usize| parts.get(&self.examples[*k].example.group);
-        let fit = |fold: &usize| {
-            let everything = 0..self.examples.len();
-            let (out, rest) = everything.partition::<Vec<_>, _>(|k| fold_of(k) == Some(fold));
-            Ok((out, self.boost(examples, &rest)?))
-        };
         let all: Vec<usize> = (0..*folds).collect();
         let fitted_part = *folds as f64 / (folds + 1) as f64;
-        for (out, trees) in side_by_side(&all, fit, &mut |part| progress(part * fitted_part))? {
+        let fitted = side_by_side(
+            &all,
+            |fold| {
+                let (out, rest): (Vec<usize>, Vec<usize>) = (0..self.examples.len())
+                    .partition(|k| parts.get(&self.examples[*k].example.group) == Some(fold));
+                Ok((out, self.boost(examples, &rest)?))
+            },
+            &mut |part| progress(part * fitted_part),
+        )?;
+        for (out, trees) in fitted {
             for trial in &mut trials {
                 let found = &trees[..trial.trees.min(trees.len())];
                 trial.held_out.extend(out.iter().map(|&k| self.judge(found, examples, k)));
@@ -100,8 +103,8 @@ impl TreeTrainer {
     }
 
     fn boost(&self, examples: &Examples, chosen: &[usize]) -> Result<Vec<Tree>> {
-        let is_person = |k: &usize| self.examples[*k].example.is_person;
-        if chosen.iter().all(is_person) || !chosen.iter().any(is_person) {
+        let people = chosen.iter().filter(|k| self.examples[**k].example.is_person).count();
+        if people == 0 || people == chosen.len() {
             return Err(Error::Other(
                 "people and others: both are needed, in several groups".into(),
             ));
@@ -110,18 +113,23 @@ impl TreeTrainer {
         Ok(boost::boost(examples, chosen, &self.training, most, self.seed))
     }
 
+    /// Counts the examples that are wanted.
+    fn count_of(&self, wanted: impl Fn(&Labelled) -> bool) -> toml::Value {
+        toml::Value::Integer(self.examples.iter().filter(|l| wanted(l)).count() as i64)
+    }
+
     fn figures(&self, trials: &[Trial], model: &Model) -> toml::Table {
-        let count = |wanted: &dyn Fn(&Labelled) -> bool| {
-            toml::Value::Integer(self.examples.iter().filter(|l| wanted(l)).count() as i64)
-        };
         let groups: std::collections::BTreeSet<u64> =
             self.examples.iter().map(|l| l.example.group).collect();
         let rows = trials.iter().map(|trial| toml::Value::Table(trial.row()));
         toml::Table::from_iter([
-            ("people".to_owned(), count(&|l| l.example.is_person)),
-            ("others".to_owned(), count(&|l| !l.example.is_person)),
-            ("people_with_depth".to_owned(), count(&|l| l.example.is_person && l.has_depth)),
-            ("others_with_depth".to_owned(), count(&|l| !l.example.is_person && l.has_depth)),
+            ("people".to_owned(), self.count_of(|l| l.example.is_person)),
+            ("others".to_owned(), self.count_of(|l| !l.example.is_person)),
+            ("people_with_depth".to_owned(), self.count_of(|l| l.example.is_person && l.has_depth)),
+            (
+                "others_with_depth".to_owned(),
+                self.count_of(|l| !l.example.is_person && l.has_depth),
+            ),
             ("groups".to_owned(), toml::Value::Integer(groups.len() as i64)),
             ("trees".to_owned(), toml::Value::Integer(model.trees.len() as i64)),
             ("slope".to_owned(), rounded(model.slope)),
@@ -179,13 +187,16 @@ impl Trial {
     /// Returns the scores of the candidates that the model will judge in use: those with depth, if
     /// there are both kinds of them.
     fn in_use(&self) -> Vec<(f64, bool)> {
-        let pairs = |depth_only: bool| -> Vec<(f64, bool)> {
-            let asked = self.held_out.iter().filter(|j| j.has_depth || !depth_only);
-            asked.map(|j| (j.sum, j.is_person)).collect()
-        };
-        let with_depth = pairs(true);
-        let has = |people: bool| with_depth.iter().any(|(_, is_person)| *is_person == people);
-        if has(true) && has(false) { with_depth } else { pairs(false) }
+        let with_depth = self.held_out_sums(true);
+        let people = with_depth.iter().filter(|(_, is_person)| *is_person).count();
+        let has_both = people > 0 && people < with_depth.len();
+        if has_both { with_depth } else { self.held_out_sums(false) }
+    }
+
+    /// Returns the sums of all candidates, or of those with depth, and whether they are people.
+    fn held_out_sums(&self, depth_only: bool) -> Vec<(f64, bool)> {
+        let asked = self.held_out.iter().filter(|j| j.has_depth || !depth_only);
+        asked.map(|j| (j.sum, j.is_person)).collect()
     }
 
     fn row(&self) -> toml::Table {
@@ -215,15 +226,17 @@ fn influence(model: &Model) -> toml::Table {
     fn reach(stump: &Stump) -> f64 {
         f64::from((stump.above - stump.below).abs())
     }
-    let stumps = || model.trees.iter().flat_map(|tree| [tree.below, tree.above]);
+    let stumps = model.trees.iter().flat_map(|tree| [tree.below, tree.above]);
     let all: Vec<(usize, f64)> =
-        stumps().map(|s| (s.feature, reach(&s))).chain(model.trees.iter().map(first)).collect();
+        stumps.map(|s| (s.feature, reach(&s))).chain(model.trees.iter().map(first)).collect();
     let total: f64 = all.iter().map(|(_, reach)| reach).sum();
-    let share = |family: Family| {
+    let mut shares = toml::Table::new();
+    for family in Family::ALL {
         let of = all.iter().filter(|(feature, _)| family.range().contains(feature));
-        rounded(of.map(|(_, reach)| reach).sum::<f64>() / total.max(f64::MIN_POSITIVE))
-    };
-    Family::ALL.iter().map(|family| (family.name().to_owned(), share(*family))).collect()
+        let reach = of.map(|(_, reach)| reach).sum::<f64>();
+        shares.insert(family.name().to_owned(), rounded(reach / total.max(f64::MIN_POSITIVE)));
+    }
+    shares
 }
 
 fn thousandths(value: f64) -> f64 {

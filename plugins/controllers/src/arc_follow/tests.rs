@@ -112,15 +112,12 @@ fn a_drive_that_cannot_be_is_not_steered() {
     let person = target(3.0, 1.0, Vector2::zeros());
     let frame = frame(EgoMotion::at_rest(0.1));
     let mut controller = ArcFollow::new(Config::default()).unwrap();
-    let mut drives = |half_separation_m, max_speed_mps| {
+    let odd = [0.0, -0.1, f64::NAN, f64::INFINITY, f64::MAX];
+    let odd = odd.into_iter().flat_map(|odd| [(odd, 0.9, false), (0.167, odd, false)]);
+    for (half_separation_m, max_speed_mps, drives) in [(0.167, 0.9, true)].into_iter().chain(odd) {
         let wheels = DiffDrive { half_separation_m, slip: 0.0 };
-        let target = Some(&person);
-        let tracks = &[][..];
-        let scene = Scene::new(&frame, tracks, wheels, max_speed_mps).with_target(target);
-        controller.command(&scene) != Twist::STOP
-    };
-    assert!(drives(0.167, 0.9));
-    for odd in [0.0, -0.1, f64::NAN, f64::INFINITY, f64::MAX] {
-        assert!(!drives(odd, 0.9) && !drives(0.167, odd), "{odd}");
+        let scene = Scene::new(&frame, &[], wheels, max_speed_mps).with_target(Some(&person));
+        let twist = controller.command(&scene);
+        assert_eq!(twist != Twist::STOP, drives, "{half_separation_m} {max_speed_mps}");
     }
 }

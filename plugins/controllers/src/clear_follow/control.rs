@@ -65,16 +65,15 @@ impl ClearFollow {
             .chain(scene.target)
             .map(|t| t.estimate.person.position.xy())
             .collect();
-        // Points on people are not obstacles: they walk, and the target would stop the robot.
-        let is_thing =
-            |at: &Point2<f64>| people.iter().all(|p| nalgebra::distance(p, at) > PERSON_M);
         self.around.move_along(&scene.frame.motion, self.config.memory_s);
         let mut look = Look::new();
         if let Ok(depth) = scene.frame.depth() {
-            look.add_depth(&scene.frame.camera, depth, self.config.heights_m, is_thing);
+            look.add_depth(&scene.frame.camera, depth, self.config.heights_m, |at| {
+                is_thing(at, &people)
+            });
         }
         for scan in scene.frame.scans() {
-            look.add_scan(scan, is_thing);
+            look.add_scan(scan, |at| is_thing(at, &people));
         }
         self.around.add_look(&look);
     }
@@ -146,4 +145,9 @@ fn walker(track: &Track, to_come: &EgoMotion) -> Option<Walker> {
     let at = to_come.apply_to_point(person.position.xy() + velocity * to_come.dt);
     let velocity = to_come.apply_to_velocity(velocity);
     at.iter().all(|v| v.abs() < MOST).then_some(Walker { at, velocity })
+}
+
+/// Whether a point is not on a person: people walk, and the target would stop the robot.
+fn is_thing(at: &Point2<f64>, people: &[Point2<f64>]) -> bool {
+    people.iter().all(|person| nalgebra::distance(person, at) > PERSON_M)
 }

@@ -56,8 +56,11 @@ pub(crate) fn plan(config: &Config, nominal: Twist, around: &PlanningInput<'_>) 
             Twist::new(part * nominal.linear_mps, turn)
         })
     });
-    let cost = |twist: &Twist| cost(config, nominal, *twist, around);
-    candidates.min_by(|a, b| cost(a).total_cmp(&cost(b))).unwrap_or(nominal)
+    let best = candidates.min_by(|a, b| {
+        let [of_a, of_b] = [a, b].map(|twist| cost(config, nominal, *twist, around));
+        of_a.total_cmp(&of_b)
+    });
+    best.unwrap_or(nominal)
 }
 
 fn cost(config: &Config, nominal: Twist, twist: Twist, around: &PlanningInput<'_>) -> f64 {
@@ -84,10 +87,11 @@ fn clearance(config: &Config, twist: Twist, around: &PlanningInput<'_>) -> f64 {
     for step in 1..=STEPS {
         let seconds = step_s * f64::from(step);
         let robot = Point2::from(pose_after(twist, seconds).translation.vector);
-        let gap = |at: Point2<f64>, its_m: f64| (at - robot).norm() - its_m - config.radius_m;
-        let things = around.things.iter().map(|at| gap(*at, 0.0));
-        let people = around.others.iter().map(|other| gap(other.after(seconds), PERSON_M));
-        least = things.chain(people).fold(least, f64::min);
+        let things = around.things.iter().map(|at| (*at, 0.0));
+        let people = around.others.iter().map(|other| (other.after(seconds), PERSON_M));
+        for (at, its_m) in things.chain(people) {
+            least = f64::min(least, (at - robot).norm() - its_m - config.radius_m);
+        }
     }
     least
 }
@@ -96,15 +100,13 @@ fn clearance(config: &Config, twist: Twist, around: &PlanningInput<'_>) -> f64 {
 /// 1.
 fn hidden(config: &Config, twist: Twist, around: &PlanningInput<'_>) -> f64 {
     let pose = pose_after(twist, config.horizon_s);
-    let seen =
-        |walker: &Walker| pose.inverse_transform_point(&walker.after(config.horizon_s)).coords;
-    let person = seen(&around.person);
+    let person = pose.inverse_transform_point(&around.person.after(config.horizon_s)).coords;
     let Some(sight) = person.try_normalize(1e-6) else { return 0.0 };
     around
         .others
         .iter()
         .map(|other| {
-            let at = seen(other);
+            let at = pose.inverse_transform_point(&other.after(config.horizon_s)).coords;
             let along = at.dot(&sight);
             let aside = at.perp(&sight).abs();
             // A person behind the target, or behind the robot, hides nothing.
@@ -187,29 +189,43 @@ mod tests {
 
     #[test]
     fn room_is_what_is_left_between_the_robot_and_things_on_its_way() {
-        let config = Config::default();
-        let room = |twist, things: &[Point2<f64>], others: &[Walker]| {
-            clearance(&config, twist, &around(things, others))
-        };
+        fn room_left(twist: Twist, things: &[Point2<f64>], others: &[Walker]) -> f64 {
+            clearance(&Config::default(), twist, &around(things, others))
+        }
+
         // In a second and a half it comes to 1.2 m, and looks at every 0.2 m.
         let beside = [Point2::new(0.8, 0.5)];
-        assert!((room(AHEAD, &beside, &[]) - 0.25).abs() < 1e-9, "its own radius");
-        assert!((room(AHEAD, &[Point2::new(2.0, 0.0)], &[]) - 0.55).abs() < 1e-9);
-        assert!((room(AHEAD, &[], &[stands(0.8, -0.9)]) - 0.4).abs() < 1e-9, "and that of people");
-        assert!((room(AHEAD, &beside, &[stands(0.8, -0.6)]) - 0.1).abs() < 1e-9, "the least");
         let crosses = Walker { velocity: Vector2::new(0.0, 1.0), ..stands(0.8, -1.0) };
-        assert!((room(AHEAD, &[], &[crosses]) + 0.5).abs() < 1e-9, "they meet after a second");
-        assert_eq!(room(STILL, &beside, &[]), f64::INFINITY);
-        assert_eq!(room(AHEAD, &[], &[]), f64::INFINITY);
+        for (things, others, expected, why) in [
+            (&beside[..], &[][..], 0.25, "its own radius"),
+            (&[Point2::new(2.0, 0.0)], &[], 0.55, "at the end of the way"),
+            (&[], &[stands(0.8, -0.9)], 0.4, "and that of people"),
+            (&beside, &[stands(0.8, -0.6)], 0.1, "the least"),
+            (&[], &[crosses], -0.5, "they meet after a second"),
+        ] {
+            let found = room_left(AHEAD, things, others);
+            assert!((found - expected).abs() < 1e-9, "{why}: {found}");
+        }
+        assert_eq!(room_left(STILL, &beside, &[]), f64::INFINITY);
+        assert_eq!(room_left(AHEAD, &[], &[]), f64::INFINITY);
     }
 
     #[test]
     fn who_stands_before_the_person_hides_them_the_more_the_less_aside() {
         let config = Config::default();
-        let by = |x: f64, y: f64| hidden(&config, STILL, &around(&[], &[stands(x, y)]));
-        assert_eq!((by(1.5, 0.0), by(1.5, 0.4), by(1.5, -0.4)), (1.0, 0.0, 0.0));
-        assert!((by(1.5, 0.175) - 0.5).abs() < 1e-9 && (by(1.5, -0.07) - 0.8).abs() < 1e-9);
-        assert_eq!((by(2.74, 0.0), by(2.76, 0.0), by(-1.0, 0.0)), (1.0, 0.0, 0.0));
+        for (x, y, expected) in [
+            (1.5, 0.0, 1.0),
+            (1.5, 0.4, 0.0),
+            (1.5, -0.4, 0.0),
+            (1.5, 0.175, 0.5),
+            (1.5, -0.07, 0.8),
+            (2.74, 0.0, 1.0),
+            (2.76, 0.0, 0.0),
+            (-1.0, 0.0, 0.0),
+        ] {
+            let found = hidden(&config, STILL, &around(&[], &[stands(x, y)]));
+            assert!((found - expected).abs() < 1e-9, "{x} {y}: {found}");
+        }
         let two = [stands(1.5, 0.175), stands(1.0, 0.07)];
         assert!((hidden(&config, STILL, &around(&[], &two)) - 0.8).abs() < 1e-9, "the worst");
         let leaves = Walker { velocity: Vector2::new(0.0, 1.0), ..stands(1.5, 0.0) };
@@ -221,22 +237,21 @@ mod tests {
 
     #[test]
     fn each_change_has_its_price() {
-        fn near(found: f64, expected: f64) {
-            assert!((found - expected).abs() < 1e-9, "{found}")
+        let slower = Twist { linear_mps: 0.35, ..AHEAD };
+        let turned = Twist { angular_rps: -0.6, ..AHEAD };
+        for (twist, things, others, expected) in [
+            (AHEAD, &[][..], &[][..], 0.0),
+            (slower, &[], &[], 0.5),
+            (turned, &[], &[], 0.15),
+            // 0.1 m of room where 0.2 m are wanted: half of it, squared, twice.
+            (AHEAD, &[Point2::new(0.8, 0.35)], &[], 0.5),
+            (AHEAD, &[Point2::new(0.8, 0.5)], &[], 0.0),
+            (AHEAD, &[Point2::new(0.8, 0.0)], &[], 2.0 * 4.0),
+            (STILL, &[], &[stands(1.5, 0.0)], 0.8 / 0.9 + 0.05),
+        ] {
+            let found = cost(&Config::default(), AHEAD, twist, &around(things, others));
+            assert!((found - expected).abs() < 1e-9, "{twist:?}: {found}");
         }
-
-        let config = Config::default();
-        let price = |twist, things: &[Point2<f64>], others: &[Walker]| {
-            cost(&config, AHEAD, twist, &around(things, others))
-        };
-        near(price(AHEAD, &[], &[]), 0.0);
-        near(price(Twist { linear_mps: 0.35, ..AHEAD }, &[], &[]), 0.5);
-        near(price(Twist { angular_rps: -0.6, ..AHEAD }, &[], &[]), 0.15);
-        // 0.1 m of room where 0.2 m are wanted: half of it, squared, twice.
-        near(price(AHEAD, &[Point2::new(0.8, 0.35)], &[]), 0.5);
-        near(price(AHEAD, &[Point2::new(0.8, 0.5)], &[]), 0.0);
-        near(price(AHEAD, &[Point2::new(0.8, 0.0)], &[]), 2.0 * 4.0);
-        near(price(STILL, &[], &[stands(1.5, 0.0)]), 0.8 / 0.9 + 0.05);
     }
 
     /// A post that is passed as easily on either side.

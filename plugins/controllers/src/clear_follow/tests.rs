@@ -74,21 +74,25 @@ fn it_turns_with_a_person_who_walks_around_it() {
     assert!(behind.1.abs() < 0.05, "{behind:?}");
 }
 
+/// Returns a depth image with a post 1 m ahead, left of the middle, before a wall.
+fn post_ahead() -> DepthImage {
+    DepthImage::from_fn(40, 30, |x, _| if (17..20).contains(&x) { 1.0 } else { 6.0 })
+}
+
 #[test]
 fn what_stands_in_the_way_is_gone_round_and_a_wall_stops_it() {
     let person = target(4.0, 0.0, Vector2::zeros());
-    let settled = |depth: &DepthImage| {
+    let free = DepthImage::filled(40, 30, 6.0);
+    let wall = DepthImage::filled(40, 30, 0.45);
+    let [free, wall, round] = [free, wall, post_ahead()].map(|depth| {
         let mut controller = ClearFollow::new(prompt()).unwrap();
         let still = EgoMotion::at_rest(0.1);
-        (0..30).map(|_| command(&mut controller, still, Some(depth.clone()), Some(&person))).last()
-    };
-    let free = settled(&DepthImage::filled(40, 30, 6.0)).unwrap();
+        let steps =
+            (0..30).map(|_| command(&mut controller, still, Some(depth.clone()), Some(&person)));
+        steps.last().unwrap()
+    });
     assert!(free.left == free.right && free.left > 0.8, "{free:?}");
-    let wall = settled(&DepthImage::filled(40, 30, 0.45)).unwrap();
     assert!(wall.left + wall.right < 0.05, "{wall:?}");
-    let round =
-        settled(&DepthImage::from_fn(40, 30, |x, _| if (17..20).contains(&x) { 1.0 } else { 6.0 }))
-            .unwrap();
     assert!((round.left - round.right).abs() > 0.05 && round.left + round.right > 0.1, "{round:?}");
 }
 
@@ -96,7 +100,7 @@ fn what_stands_in_the_way_is_gone_round_and_a_wall_stops_it() {
 #[test]
 fn what_a_laser_scanner_sees_is_gone_round_and_the_person_is_no_thing() {
     let person = target(4.0, 0.0, Vector2::zeros());
-    let settled = |points: &[[f64; 2]]| {
+    let [free, round] = [[[3.8, 0.05], [3.8, -0.05]], [[1.0, 0.05], [1.0, 0.1]]].map(|points| {
         let mut controller = ClearFollow::new(prompt()).unwrap();
         let points: Vec<_> = points.iter().map(|[x, y]| Point3::new(*x, *y, 0.2)).collect();
         let motion = EgoMotion::at_rest(0.1);
@@ -105,10 +109,8 @@ fn what_a_laser_scanner_sees_is_gone_round_and_the_person_is_no_thing() {
         let tracks = std::slice::from_ref(&person);
         let scene = Scene::new(&frame, tracks, WHEELS, MAX_MPS).with_target(Some(&person));
         (0..30).map(|_| controller.command(&scene)).last().unwrap()
-    };
-    let free = settled(&[[3.8, 0.05], [3.8, -0.05]]);
+    });
     assert!(free.angular_rps == 0.0 && free.linear_mps > 0.8, "{free:?}");
-    let round = settled(&[[1.0, 0.05], [1.0, 0.1]]);
     assert!(round.angular_rps < -0.1 && round.linear_mps > 0.1, "{round:?}");
 }
 
@@ -116,16 +118,13 @@ fn what_a_laser_scanner_sees_is_gone_round_and_the_person_is_no_thing() {
 fn it_speeds_up_and_slows_down_no_faster_than_it_may() {
     let mut controller = ClearFollow::new(prompt()).unwrap();
     let still = EgoMotion::at_rest(0.1);
-    let mut speed = |x: f64| {
+    // It slows down by 0.6 m/s².
+    for (x, expected) in [(4.0, 0.05), (4.0, 0.1), (4.0, 0.15), (1.4, 0.09)] {
         let person = target(x, 0.0, Vector2::zeros());
         let WheelSpeeds { left, right } = command(&mut controller, still, None, Some(&person));
-        0.5 * (left + right)
-    };
-    let faster: Vec<f64> = (0..3).map(|_| speed(4.0)).collect();
-    for (found, expected) in faster.iter().zip([0.05, 0.1, 0.15]) {
-        assert!((found - expected).abs() < 1e-9, "{faster:?}");
+        let speed = 0.5 * (left + right);
+        assert!((speed - expected).abs() < 1e-9, "{x}: {speed}");
     }
-    assert!((speed(1.4) - 0.09).abs() < 1e-9, "0.6 m/s²");
     assert_eq!(ClearFollow::new(prompt()).unwrap().stand_off_m(), Some(1.4));
 }
 
@@ -196,19 +195,16 @@ fn it_drives_the_more_slowly_the_more_it_has_to_turn() {
 /// The person is straight ahead, so that all of the turn is the detour around the post.
 #[test]
 fn a_detour_keeps_its_curvature_while_the_robot_speeds_up() {
-    let depth = DepthImage::from_fn(40, 30, |x, _| if (17..20).contains(&x) { 1.0 } else { 6.0 });
     let person = target(4.0, 0.0, Vector2::zeros());
-    let first = |max_acceleration: f64| {
+    let [at_once, slowly] = [1e3, 0.5].map(|max_acceleration| {
         let config = Config { max_acceleration, ..prompt() };
         let mut controller = ClearFollow::new(config).unwrap();
         let still = EgoMotion::at_rest(0.1);
-        let wheels = command(&mut controller, still, Some(depth.clone()), Some(&person));
+        let wheels = command(&mut controller, still, Some(post_ahead()), Some(&person));
         let speed = wheels.left + wheels.right;
         let turn = wheels.right - wheels.left;
         (0.5 * speed, turn / (2.0 * WHEELS.half_separation_m))
-    };
-    let at_once = first(1e3);
-    let slowly = first(0.5);
+    });
     // The post is to the left of the middle.
     assert!(at_once.0 > 0.2 && at_once.1 < -0.2, "{at_once:?}");
     assert!((slowly.0 - 0.05).abs() < 1e-9, "{slowly:?}");
@@ -238,26 +234,21 @@ fn somebody_unseen_is_followed_ever_more_slowly_and_then_no_more() {
 
 #[test]
 fn the_person_is_no_obstacle_and_others_are() {
-    fn body(x: usize, _: usize) -> f32 {
-        if (17..23).contains(&x) { 1.5 } else { 6.0 }
-    }
-
     let person = target(1.6, 0.0, Vector2::new(0.8, 0.0));
-    let settled = |depth: Option<DepthImage>, other: Option<Track>| {
+    let mut other = target(0.9, 0.1, Vector2::zeros());
+    other.id = tagalong_core::TrackId(2);
+    let body = DepthImage::from_fn(40, 30, |x, _| if (17..23).contains(&x) { 1.5 } else { 6.0 });
+    let cases = [(None, None), (Some(body), None), (None, Some(other))];
+    let [free, with_body, with_other] = cases.map(|(depth, other)| {
         let mut controller = ClearFollow::new(prompt()).unwrap();
         let images = Images { depth: depth.map(Arc::new), ..Images::default() };
         let tracks: Vec<Track> = other.into_iter().chain([person.clone()]).collect();
         let frame = Frame::new(1, Stamp::default(), camera(), EgoMotion::at_rest(0.1), images);
-        let target = Some(&person);
-        let tracks = &tracks[..];
-        let scene = Scene::new(&frame, tracks, WHEELS, MAX_MPS).with_target(target);
+        let scene = Scene::new(&frame, &tracks, WHEELS, MAX_MPS).with_target(Some(&person));
         (0..30).map(|_| controller.command(&scene)).last().unwrap()
-    };
-    let free = settled(None, None);
-    assert_eq!(settled(Some(DepthImage::from_fn(40, 30, body)), None), free);
-    let mut other = target(0.9, 0.1, Vector2::zeros());
-    other.id = tagalong_core::TrackId(2);
-    assert_ne!(settled(None, Some(other)), free);
+    });
+    assert_eq!(with_body, free);
+    assert_ne!(with_other, free);
 }
 
 #[test]
@@ -266,9 +257,7 @@ fn what_a_turn_has_moved_out_of_the_image_is_remembered_for_a_while() {
         let mut controller = ClearFollow::new(prompt()).unwrap();
         let person = target(4.0, 0.0, Vector2::zeros());
         let still = EgoMotion::at_rest(0.1);
-        let depth =
-            DepthImage::from_fn(40, 30, |x, _| if (17..20).contains(&x) { 1.0 } else { 6.0 });
-        command(&mut controller, still, Some(depth), Some(&person));
+        command(&mut controller, still, Some(post_ahead()), Some(&person));
         let steps = (0..(seconds / 0.1) as u32)
             .map(|_| command(&mut controller, still, None, Some(&person)));
         let wheels = steps.last().unwrap();
@@ -283,17 +272,14 @@ fn a_drive_that_cannot_be_is_not_steered() {
     let person = target(3.0, 0.5, Vector2::zeros());
     let frame =
         Frame::new(1, Stamp::default(), camera(), EgoMotion::at_rest(0.1), Images::default());
-    let drives = |half_separation_m, max_speed_mps| {
+    let odd = [0.0, -0.1, f64::NAN, f64::INFINITY, f64::MAX];
+    let odd = odd.into_iter().flat_map(|odd| [(odd, 0.9, false), (0.167, odd, false)]);
+    for (half_separation_m, max_speed_mps, drives) in [(0.167, 0.9, true)].into_iter().chain(odd) {
         let wheels = DiffDrive { half_separation_m, slip: 0.0 };
         let mut controller = ClearFollow::new(prompt()).unwrap();
-        let target = Some(&person);
-        let tracks = &[][..];
-        let scene = Scene::new(&frame, tracks, wheels, max_speed_mps).with_target(target);
-        controller.command(&scene) != Twist::STOP
-    };
-    assert!(drives(0.167, 0.9));
-    for odd in [0.0, -0.1, f64::NAN, f64::INFINITY, f64::MAX] {
-        assert!(!drives(odd, 0.9) && !drives(0.167, odd), "{odd}");
+        let scene = Scene::new(&frame, &[], wheels, max_speed_mps).with_target(Some(&person));
+        let twist = controller.command(&scene);
+        assert_eq!(twist != Twist::STOP, drives, "{half_separation_m} {max_speed_mps}");
     }
 }
 

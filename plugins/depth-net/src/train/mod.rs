@@ -90,22 +90,26 @@ impl DepthNetTrainer {
     /// its variation.
     fn gradient(&self, net: &Net, batch: &[(usize, u64)]) -> Result<Net> {
         let chunks: Vec<&[(usize, u64)]> = batch.chunks(batch.len().div_ceil(PARTS)).collect();
-        let of_part = |part: &&[(usize, u64)]| {
-            let mut gradient = Net::default();
-            let mut pass = Pass::default();
-            let mut cells = 0.0;
-            for (sample, seed) in *part {
-                let (map, targets) = self.samples[*sample].varied(&mut Draws(*seed));
-                net.look(&map, &mut pass);
-                let mut of = Pass::default();
-                cells += targets.slopes(&pass, &mut of);
-                net.learn(&map, &pass, &mut gradient, &mut of);
-            }
-            Ok((gradient, cells))
-        };
+        let parts = side_by_side(
+            &chunks,
+            |part| {
+                let mut gradient = Net::default();
+                let mut pass = Pass::default();
+                let mut cells = 0.0;
+                for (sample, seed) in *part {
+                    let (map, targets) = self.samples[*sample].varied(&mut Draws(*seed));
+                    net.look(&map, &mut pass);
+                    let mut of = Pass::default();
+                    cells += targets.slopes(&pass, &mut of);
+                    net.learn(&map, &pass, &mut gradient, &mut of);
+                }
+                Ok((gradient, cells))
+            },
+            &mut |_| {},
+        )?;
         let mut sum = Net::default();
         let mut cells = 0.0;
-        for (part, of_part) in side_by_side(&chunks, of_part, &mut |_| {})? {
+        for (part, of_part) in parts {
             cells += of_part;
             let pairs =
                 sum.parts_mut().into_iter().flatten().zip(part.parts().into_iter().flatten());
@@ -247,12 +251,16 @@ impl<'a> Steps<'a> {
 /// Returns the models of the folds. Each is calibrated by the answers of the other folds, because
 /// those in its own room would tell it about that room; a single one by those in simulation.
 fn models_without(folds: Vec<Fold>, in_simulation: &Score) -> Vec<(String, String)> {
-    let others = |own: usize| {
+    let mut calibrations = Vec::with_capacity(folds.len());
+    for own in 0..folds.len() {
         let others = folds.iter().enumerate().filter(|(at, _)| *at != own);
         let scores: Vec<&Score> = others.map(|(_, fold)| &fold.score).collect();
-        if scores.is_empty() { in_simulation.clone() } else { Score::all(&scores) }
-    };
-    let calibrations: Vec<Score> = (0..folds.len()).map(others).collect();
+        calibrations.push(if scores.is_empty() {
+            in_simulation.clone()
+        } else {
+            Score::all(&scores)
+        });
+    }
     folds
         .into_iter()
         .zip(calibrations)
@@ -335,19 +343,21 @@ mod tests {
         add(&mut trainer, true, None, 0);
         add(&mut trainer, false, None, 1);
         let net = start(5);
-        let gradient = |batch: &[(usize, u64)]| values(&trainer.gradient(&net, batch).unwrap());
         let person = (0, 11);
         let empty = (1, 12);
-        let alone = [gradient(&[person]), gradient(&[empty])];
-        assert!(apart(&alone[0], &gradient(&[person; 2])) < 1e-4);
-        assert!(apart(&alone[1], &gradient(&[empty; 5])) < 1e-4, "in four parts of unlike size");
+        let batches =
+            [vec![person], vec![empty], vec![person; 2], vec![empty; 5], vec![person, empty]];
+        let [of_person, of_empty, twice, five_times, both] =
+            batches.map(|batch| values(&trainer.gradient(&net, &batch).unwrap()));
+        assert!(apart(&of_person, &twice) < 1e-4);
+        assert!(apart(&of_empty, &five_times) < 1e-4, "in four parts of unlike size");
         // Both together: the sum of their slopes over the cells of the person.
         let (_, targets) = trainer.samples[0].varied(&mut Draws(person.1));
         let cells = targets.places().len() as f32;
         assert!(cells > 2.0, "{cells}");
         let sum: Vec<f32> =
-            alone[0].iter().zip(&alone[1]).map(|(person, empty)| person + empty / cells).collect();
-        assert!(apart(&sum, &gradient(&[person, empty])) < 1e-3);
+            of_person.iter().zip(&of_empty).map(|(person, empty)| person + empty / cells).collect();
+        assert!(apart(&sum, &both) < 1e-3);
     }
 
     #[test]
@@ -378,15 +388,17 @@ mod tests {
         add(&mut trainer, true, None, 0);
         let rate = trainer.training.rate;
         let begun = start(2);
-        let step = |net: Net| apart_by(&values(&begun), &values(&net));
         let all = vec![0];
         let none = Chosen::new();
-        let mut steps = |_: f64| {};
-        let whole = trainer.trained(begun.clone(), 2, [&all, &none], rate, &mut steps).unwrap();
-        let mut progress = |_: f64| {};
-        let mut steps = Steps::new(&trainer.training, 0, &mut progress);
-        let half = trainer.further(begun.clone(), [&all, &none], &mut steps).unwrap();
-        let ratio = step(half) / step(whole);
+        let whole = trainer.trained(begun.clone(), 2, [&all, &none], rate, &mut |_| {}).unwrap();
+        let further = trainer.further(
+            begun.clone(),
+            [&all, &none],
+            &mut Steps::new(&trainer.training, 0, &mut |_| {}),
+        );
+        let [half, whole] =
+            [further.unwrap(), whole].map(|net| apart_by(&values(&begun), &values(&net)));
+        let ratio = half / whole;
         assert!((ratio - 0.5).abs() < 0.01, "{ratio}");
     }
 
@@ -470,13 +482,16 @@ mod tests {
 
     #[test]
     fn progress_counts_the_steps_of_every_training() {
-        let mut told = Vec::new();
-        let training = Training { steps: 6, real_steps: 2, ..Training::default() };
-        let mut progress = |part: f64| told.push(part);
-        let mut steps = Steps::new(&training, 2, &mut progress);
-        for (count, part) in [(6, 0.5), (6, 1.0), (2, 1.0), (2, 0.5), (2, 1.0), (2, 1.0)] {
-            steps.tell(count, part);
+        fn tell_steps(progress: &mut dyn FnMut(f64)) {
+            let training = Training { steps: 6, real_steps: 2, ..Training::default() };
+            let mut steps = Steps::new(&training, 2, progress);
+            for (count, part) in [(6, 0.5), (6, 1.0), (2, 1.0), (2, 0.5), (2, 1.0), (2, 1.0)] {
+                steps.tell(count, part);
+            }
         }
+
+        let mut told = Vec::new();
+        tell_steps(&mut |part| told.push(part));
         let twelfths: Vec<f64> = told.iter().map(|part| (part * 12.0).round()).collect();
         assert_eq!(twelfths, [3.0, 6.0, 8.0, 9.0, 10.0, 12.0]);
     }

@@ -104,10 +104,12 @@ impl Sample {
         let mut depth = self.depth();
         depth.pixels_mut().iter_mut().for_each(|metres| *metres *= scale as f32);
         let turn = Isometry3::rotation(Vector3::z() * draws.between(-TURN_RAD, TURN_RAD));
-        let grown = |point: Point3<f64>| turn * Point3::from(point.coords * scale);
-        people.iter_mut().for_each(|person| person.head = grown(person.head));
+        for person in &mut people {
+            person.head = turn * Point3::from(person.head.coords * scale);
+        }
         let mut pose = turn * camera.robot_from_camera;
-        pose.translation.vector = grown(camera.robot_from_camera.translation.vector.into()).coords;
+        let place = camera.robot_from_camera.translation.vector;
+        pose.translation.vector = (turn * Point3::from(place * scale)).coords;
         camera.robot_from_camera = misjudged(&pose, draws);
         degrade(&mut depth, draws);
         let (camera, depth) = cut(camera, depth, draws);
@@ -206,12 +208,12 @@ mod tests {
             let Some(place) = targets.places().first().copied() else { continue };
             let row = place[0] as usize;
             let column = place[1] as usize;
-            let near =
+            let mut near =
                 (row - 3..row + 4).flat_map(|y| (column - 3..column + 4).map(move |x| (y, x)));
-            let is_tall = |(y, x): (usize, usize)| {
+            let has_tall = near.any(|(y, x)| {
                 map.fine.at(2 * y, 2 * x)[FloorMap::FINE - 1] > 0.25 && map.in_view[y * 64 + x]
-            };
-            assert!(near.into_iter().any(is_tall), "{seed}: {place:?}");
+            });
+            assert!(has_tall, "{seed}: {place:?}");
             places.push(place[1]);
         }
         places.sort_by(f64::total_cmp);
@@ -299,14 +301,13 @@ mod tests {
     #[test]
     fn noise_grows_with_the_square_of_depth() {
         for metres in [1.0, 2.0] {
-            let sigmas = degraded(metres).iter().map(readings).collect::<Vec<_>>();
-            let of = |values: &Vec<f64>| {
+            let mut sigmas = Vec::new();
+            for values in degraded(metres).iter().map(readings).filter(|v| v.len() > 1000) {
                 let off: Vec<f64> = values.iter().map(|v| v - f64::from(metres)).collect();
                 let mean = off.iter().sum::<f64>() / off.len() as f64;
                 assert!(mean.abs() < 0.001, "noise has no direction: {mean}");
-                (off.iter().map(|v| v * v).sum::<f64>() / off.len() as f64).sqrt()
-            };
-            let sigmas: Vec<f64> = sigmas.iter().filter(|v| v.len() > 1000).map(of).collect();
+                sigmas.push((off.iter().map(|v| v * v).sum::<f64>() / off.len() as f64).sqrt());
+            }
             // Up to 4 mm at 1 m, in half of the images.
             let most = 0.004 * f64::from(metres * metres);
             let largest = sigmas.iter().copied().fold(0.0, f64::max);
@@ -349,20 +350,22 @@ mod tests {
             let pixels = depth.pixels();
             let holes = pixels.iter().filter(|metres| metres.is_nan()).count();
             // A single block has no hole without one beside it; single holes are scattered.
-            let beside = |k: usize| pixels[k].is_nan() && pixels[k + 1].is_nan();
-            let pairs = (0..pixels.len() - 1).filter(|k| beside(*k)).count();
+            let pairs = pixels.windows(2).filter(|pair| pair.iter().all(|m| m.is_nan())).count();
             holes > 0 && 10 * pairs > 7 * holes
         });
         let sizes: Vec<[usize; 2]> = blocks
             .map(|depth| {
-                let row_of = |y: usize| depth.row(y).iter().filter(|m| m.is_nan()).count();
-                let widest = (0..90).map(row_of).max().unwrap_or(0);
-                [widest, (0..90).filter(|y| row_of(*y) > 0).count()]
+                let rows: Vec<usize> = (0..90)
+                    .map(|y| depth.row(y).iter().filter(|metres| metres.is_nan()).count())
+                    .collect();
+                let widest = rows.iter().copied().max().unwrap_or(0);
+                [widest, rows.iter().filter(|holes| **holes > 0).count()]
             })
             .collect();
         assert!(sizes.len() > 20, "{}", sizes.len());
-        let largest = |k: usize| sizes.iter().map(|size| size[k]).max().unwrap_or(0);
-        assert!(largest(0) > 49 && largest(1) > 49, "several blocks: {sizes:?}");
+        for k in [0, 1] {
+            assert!(sizes.iter().any(|size| size[k] > 49), "several blocks: {sizes:?}");
+        }
         assert!(sizes.iter().any(|[wide, high]| *wide < 50 && *high < 50), "{sizes:?}");
     }
 
@@ -396,22 +399,31 @@ mod tests {
         assert!((36..130).contains(&shortest), "15 % are left at the least: {shortest}");
     }
 
+    /// Returns the root of the mean square of some values.
+    fn root_mean_square(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+        let count = values.len() as f64;
+        (values.map(|value| value.powi(2)).sum::<f64>() / count).sqrt()
+    }
+
     #[test]
     fn a_misjudged_camera_is_tilted_and_lifted_a_little() {
         let pose = sample().camera.robot_from_camera;
         let mut draws = Draws(9);
         let wrong: Vec<Isometry3<f64>> = (0..500).map(|_| misjudged(&pose, &mut draws)).collect();
-        let sigma = |values: &dyn Fn(&Isometry3<f64>) -> f64| {
-            (wrong.iter().map(|w| values(w).powi(2)).sum::<f64>() / wrong.len() as f64).sqrt()
-        };
-        let turn = |w: &Isometry3<f64>| (w.rotation * pose.rotation.inverse()).scaled_axis();
+        let turns: Vec<_> = wrong
+            .iter()
+            .map(|wrong| (wrong.rotation * pose.rotation.inverse()).scaled_axis())
+            .collect();
         for axis in [0, 1] {
-            assert!((sigma(&|w| turn(w)[axis]) / TILT_RAD - 1.0).abs() < 0.1, "{axis}");
+            let tilt = root_mean_square(turns.iter().map(|turn| turn[axis]));
+            assert!((tilt / TILT_RAD - 1.0).abs() < 0.1, "{axis}");
         }
-        assert!(sigma(&|w| turn(w).z) < 1e-9, "its heading is known");
-        let off = |w: &Isometry3<f64>| w.translation.vector - pose.translation.vector;
-        assert!((sigma(&|w| off(w).z) / HEIGHT_M - 1.0).abs() < 0.1);
-        assert!(sigma(&|w| off(w).xy().norm()) < 1e-12);
+        let heading = root_mean_square(turns.iter().map(|turn| turn.z));
+        assert!(heading < 1e-9, "its heading is known");
+        let off = wrong.iter().map(|wrong| wrong.translation.vector - pose.translation.vector);
+        let lifted = root_mean_square(off.clone().map(|off| off.z));
+        assert!((lifted / HEIGHT_M - 1.0).abs() < 0.1);
+        assert!(root_mean_square(off.map(|off| off.xy().norm())) < 1e-12);
     }
 
     #[test]

@@ -44,12 +44,12 @@ impl Score {
         self.frames += 1;
         self.people += missing.len();
         for peak in peaks(map, pass, LEAST, SEPARATION_M) {
-            let off = |k: usize| peak.distance_m(&sample.people[k].head.xy());
-            let nearest =
-                (0..missing.len()).min_by(|a, b| off(missing[*a]).total_cmp(&off(missing[*b])));
-            match nearest.filter(|at| off(missing[*at]) < SAME_M) {
-                Some(at) => {
-                    let off_m = off(missing.swap_remove(at));
+            let nearest = (0..missing.len())
+                .map(|at| (at, peak.distance_m(&sample.people[missing[at]].head.xy())))
+                .min_by(|(_, a), (_, b)| a.total_cmp(b));
+            match nearest.filter(|(_, off_m)| *off_m < SAME_M) {
+                Some((at, off_m)) => {
+                    missing.swap_remove(at);
                     self.found.push((peak.logit, true, off_m));
                 }
                 None => self.add_false(&peak, sample),
@@ -58,8 +58,8 @@ impl Score {
     }
 
     fn add_false(&mut self, peak: &Peak, sample: &Sample) {
-        let is_near = |at: nalgebra::Point2<f64>| peak.distance_m(&at) < NEAR_M;
-        if !sample.people.iter().any(|person| is_near(person.head.xy())) {
+        let mut heads = sample.people.iter().map(|person| person.head.xy());
+        if !heads.any(|head| peak.distance_m(&head) < NEAR_M) {
             self.found.push((peak.logit, false, 0.0));
         }
     }
@@ -90,10 +90,11 @@ impl Score {
             count as f64 / all.max(1) as f64
         }
 
-        let count = |is: bool| {
-            self.found.iter().filter(|(logit, person, _)| *logit >= least && *person == is).count()
-        };
-        (of(count(true), self.people), of(count(false), self.frames))
+        let [found, wrong] = [true, false].map(|is_person| {
+            let of_kind = self.found.iter().filter(|(_, person, _)| *person == is_person);
+            of_kind.filter(|(logit, ..)| *logit >= least).count()
+        });
+        (of(found, self.people), of(wrong, self.frames))
     }
 
     /// Returns the best recall with few false people.

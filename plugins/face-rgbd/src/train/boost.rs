@@ -42,37 +42,39 @@ fn drawn_features(samples: &Samples<'_>, training: &Training, seed: u64) -> (Vec
 /// Generates a random feature.
 fn drawn(side: usize, seed: u64) -> Feature {
     let mut state = seed;
-    let mut below = |n: usize| {
-        state = mix(state);
-        (state % n as u64) as usize
-    };
     loop {
-        let (columns, rows) = KINDS[below(KINDS.len())];
-        let width = 1 + below(side / columns);
-        let height = 1 + below(side / rows);
+        let (columns, rows) = KINDS[next_below(&mut state, KINDS.len())];
+        let width = 1 + next_below(&mut state, side / columns);
+        let height = 1 + next_below(&mut state, side / rows);
         if width * height < LEAST_BLOCK {
             continue;
         }
-        let x = below(side - columns * width + 1);
-        let y = below(side - rows * height + 1);
+        let x = next_below(&mut state, side - columns * width + 1);
+        let y = next_below(&mut state, side - rows * height + 1);
         return haar_feature((columns, rows), Part { x, y, width, height });
     }
+}
+
+/// Draws a number below `n`.
+fn next_below(state: &mut u64, n: usize) -> usize {
+    *state = mix(*state);
+    (*state % n as u64) as usize
 }
 
 /// Returns a feature with weight -1 for all blocks, and a positive weight for one block, or for two
 /// of them crosswise, that balances it.
 fn haar_feature((columns, rows): (usize, usize), first: Part) -> Feature {
-    let block = |x: usize, y: usize| Part {
+    let [below, right, diagonal] = [(0, 1), (1, 0), (1, 1)].map(|(x, y)| Part {
         x: first.x + x * first.width,
         y: first.y + y * first.height,
         ..first
-    };
+    });
     let whole = Part { width: columns * first.width, height: rows * first.height, ..first };
     let weight = (columns * rows) as f32;
     Feature::Haar(match (columns, rows) {
-        (2, 2) => vec![(whole, -1.0), (block(0, 0), 2.0), (block(1, 1), 2.0)],
-        (1, _) => vec![(whole, -1.0), (block(0, 1), weight)],
-        _ => vec![(whole, -1.0), (block(1, 0), weight)],
+        (2, 2) => vec![(whole, -1.0), (first, 2.0), (diagonal, 2.0)],
+        (1, _) => vec![(whole, -1.0), (below, weight)],
+        _ => vec![(whole, -1.0), (right, weight)],
     })
 }
 

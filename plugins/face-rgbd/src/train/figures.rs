@@ -42,9 +42,9 @@ impl GroupCounts {
         self.faces += free.iter().filter(|face| face.width >= LEAST_PX).count();
         self.pictures += 1;
         for group in groups {
-            let iou = |face: &&Rect| face.iou(&group.region);
-            let best = (0..free.len()).max_by(|a, b| iou(&free[*a]).total_cmp(&iou(&free[*b])));
-            let face = best.filter(|i| iou(&free[*i]) >= SAME).map(|i| free.remove(i));
+            let overlaps = free.iter().map(|face| face.iou(&group.region)).enumerate();
+            let best = overlaps.max_by(|(_, a), (_, b)| a.total_cmp(b));
+            let face = best.filter(|(_, iou)| *iou >= SAME).map(|(i, _)| free.remove(i));
             if face.is_none_or(|face| face.width >= LEAST_PX) {
                 // The logarithm needs a positive strength.
                 self.groups.push((group.strength.max(1e-3).ln(), face.is_some()));
@@ -82,9 +82,10 @@ fn search(
     let mut found = GroupCounts::default();
     let mut scanner = Scanner::default();
     let least = cascade.width.min(cascade.height);
-    let is_large = |p: &&Picture| p.grey.width() > least && p.grey.height() > least;
-    for picture in pictures.iter().filter(|p| wanted(p)).filter(is_large) {
-        found.add(&mut scanner, cascade, config, picture);
+    for picture in pictures.iter().filter(|p| wanted(p)) {
+        if picture.grey.width() > least && picture.grey.height() > least {
+            found.add(&mut scanner, cascade, config, picture);
+        }
     }
     found
 }

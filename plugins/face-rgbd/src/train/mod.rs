@@ -129,26 +129,32 @@ impl CascadeTrainer {
         let mut seen = 0_u64;
         let longest = grey.width().min(grey.height()) as f64;
         for scale in scales(cascade, 0.0, longest, SCALE_STEP) {
-            let is_other = |x: usize, y: usize| {
-                let [x, y, side] = [x, y, side].map(|v| v as f64 * scale);
-                let window = Rect::new(x, y, side, side);
-                faces.iter().all(|face| face.iou(&window) < BESIDE)
-            };
-            scanner.size(grey, cascade, scale, &whole(grey), &is_other, &mut |window| {
-                // Reservoir sampling: all windows have the same chance, though their number is not
-                // known before.
-                seen += 1;
-                let place = mix(salt ^ mix(index as u64) ^ seen) % seen;
-                let place = if found.len() < most { found.len() } else { place as usize };
-                if place < most
-                    && let Some(patch) = Patch::of(&window, side)
-                {
-                    match found.get_mut(place) {
-                        Some(old) => *old = patch,
-                        None => found.push(patch),
+            scanner.size(
+                grey,
+                cascade,
+                scale,
+                &whole(grey),
+                &|x, y| {
+                    let [x, y, side] = [x, y, side].map(|v| v as f64 * scale);
+                    let window = Rect::new(x, y, side, side);
+                    faces.iter().all(|face| face.iou(&window) < BESIDE)
+                },
+                &mut |window| {
+                    // Reservoir sampling: all windows have the same chance, though their number is
+                    // not known before.
+                    seen += 1;
+                    let place = mix(salt ^ mix(index as u64) ^ seen) % seen;
+                    let place = if found.len() < most { found.len() } else { place as usize };
+                    if place < most
+                        && let Some(patch) = Patch::of(&window, side)
+                    {
+                        match found.get_mut(place) {
+                            Some(old) => *old = patch,
+                            None => found.push(patch),
+                        }
                     }
-                }
-            });
+                },
+            );
         }
         found
     }
@@ -231,12 +237,13 @@ impl Trainer for CascadeTrainer {
         }
         cascade.calibration = Some(calibration(&cascade, &self.config, &self.pictures));
         let mut table = figures(&cascade, &self.config, &self.pictures);
-        let list = |of: fn(&Mined) -> i64| log.iter().map(of).collect::<Vec<i64>>().into();
         table.insert("windows_of_faces".into(), (self.faces.len() as i64).into());
         let trees = cascade.stages.iter().map(|stage| stage.trees.len() as i64);
         table.insert("trees".into(), trees.collect::<Vec<i64>>().into());
-        table.insert("mined".into(), list(|m| m.found as i64));
-        table.insert("searched".into(), list(|m| m.looked_at as i64));
+        let mined = log.iter().map(|mined| mined.found as i64);
+        table.insert("mined".into(), mined.collect::<Vec<i64>>().into());
+        let searched = log.iter().map(|mined| mined.looked_at as i64);
+        table.insert("searched".into(), searched.collect::<Vec<i64>>().into());
         progress(1.0);
         Ok(Fitted::new(cascade.to_xml(), table))
     }
@@ -272,10 +279,14 @@ mod tests {
     #[test]
     fn a_region_is_inside_up_to_the_border() {
         let picture = GreyImage::filled(40, 30, 0);
-        let inside = |x, y, width, height| is_inside(&picture, &Rect::new(x, y, width, height));
-        assert!(inside(0.0, 0.0, 40.0, 30.0));
-        for (x, y) in [(-0.1, 0.0), (0.0, -0.1), (0.1, 0.0), (0.0, 0.1)] {
-            assert!(!inside(x, y, 40.0, 30.0), "{x} {y}");
+        for (x, y, expected) in [
+            (0.0, 0.0, true),
+            (-0.1, 0.0, false),
+            (0.0, -0.1, false),
+            (0.1, 0.0, false),
+            (0.0, 0.1, false),
+        ] {
+            assert_eq!(is_inside(&picture, &Rect::new(x, y, 40.0, 30.0)), expected, "{x} {y}");
         }
     }
 }

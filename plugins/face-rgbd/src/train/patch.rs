@@ -18,11 +18,15 @@ impl Patch {
     pub(super) fn new(pixels: &GreyImage, side: usize) -> Option<Self> {
         let mut level = Level::default();
         level.fill(pixels, (side, side), 1);
-        let values =
-            || (1..side - 1).flat_map(|y| pixels.row(y)[1..side - 1].iter().map(|v| f64::from(*v)));
         let area = ((side - 2) * (side - 2)) as f64;
-        let sum = values().sum::<f64>();
-        let squares = values().map(|v| v * v).sum::<f64>();
+        let mut sum = 0.0;
+        let mut squares = 0.0;
+        for y in 1..side - 1 {
+            for value in &pixels.row(y)[1..side - 1] {
+                sum += f64::from(*value);
+                squares += f64::from(*value) * f64::from(*value);
+            }
+        }
         let root = (area * squares - sum * sum).max(0.0).sqrt();
         (root > 10.0 * area).then(|| Self { level, contrast: (1.0 / root) as f32 })
     }
@@ -48,16 +52,9 @@ impl Patch {
 /// averaging over skipped pixels. Outside the picture its border is continued. The window is turned
 /// clockwise about its middle by `tilt`, rad.
 pub(super) fn window(grey: &GreyImage, region: &Rect, tilt: f64, side: usize) -> GreyImage {
-    fn clamp(v: i64, length: usize) -> i64 {
-        v.clamp(0, length.max(1) as i64 - 1)
-    }
-
     let scale = region.width / side as f64;
     let middle = region.centre();
     let (sin, cos) = tilt.sin_cos();
-    let at = |x: i64, y: i64| {
-        f64::from(grey.get(clamp(x, grey.width()), clamp(y, grey.height())).unwrap_or_default())
-    };
     GreyImage::from_fn(side, side, |i, j| {
         let [right, down] = [i, j].map(|at| (at as f64 + 0.5 - 0.5 * side as f64) * scale);
         let x = middle.x + right * cos - down * sin - 0.5;
@@ -68,9 +65,18 @@ pub(super) fn window(grey: &GreyImage, region: &Rect, tilt: f64, side: usize) ->
         let down = y - top;
         let left = left as i64;
         let top = top as i64;
-        let across = |y: i64| at(left, y) * (1.0 - right) + at(left + 1, y) * right;
-        (across(top) * (1.0 - down) + across(top + 1) * down).round() as u8
+        let [upper, lower] = [top, top + 1].map(|y| {
+            clamped_pixel(grey, left, y) * (1.0 - right) + clamped_pixel(grey, left + 1, y) * right
+        });
+        (upper * (1.0 - down) + lower * down).round() as u8
     })
+}
+
+/// Returns a pixel; outside the picture its border is continued.
+fn clamped_pixel(grey: &GreyImage, x: i64, y: i64) -> f64 {
+    let [x, y] = [(x, grey.width()), (y, grey.height())]
+        .map(|(v, length)| v.clamp(0, length.max(1) as i64 - 1));
+    f64::from(grey.get(x, y).unwrap_or_default())
 }
 
 #[cfg(test)]

@@ -190,20 +190,23 @@ fn decayed(time_constant_s: f64, dt: f64) -> (f64, f64) {
 pub(crate) fn moved(m: &Matrix5, motion: &EgoMotion, decay_s: f64) -> Matrix5 {
     let back = turn_back(motion);
     let (passed, kept) = decayed(decay_s, motion.dt);
-    let ahead = back * passed;
-    let onwards = back * kept;
-    let rows = |m: &Matrix5| {
-        let mut out = *m;
-        for (mut out, m) in out.column_iter_mut().zip(m.column_iter()) {
-            for i in 0..2 {
-                let now = back[(i, 0)] * m[0] + back[(i, 1)] * m[1];
-                out[i] = now + ahead[(i, 0)] * m[3] + ahead[(i, 1)] * m[4];
-                out[i + 3] = onwards[(i, 0)] * m[3] + onwards[(i, 1)] * m[4];
-            }
+    let coupling = [back, back * passed, back * kept];
+    moved_rows(&moved_rows(m, &coupling).transpose(), &coupling).transpose()
+}
+
+/// Moves each column: `back` turns the place, `ahead` adds the way that the velocity goes, and
+/// `onwards` is what becomes of the velocity.
+#[inline]
+fn moved_rows(m: &Matrix5, [back, ahead, onwards]: &[Matrix2<f64>; 3]) -> Matrix5 {
+    let mut out = *m;
+    for (mut out, m) in out.column_iter_mut().zip(m.column_iter()) {
+        for i in 0..2 {
+            let now = back[(i, 0)] * m[0] + back[(i, 1)] * m[1];
+            out[i] = now + ahead[(i, 0)] * m[3] + ahead[(i, 1)] * m[4];
+            out[i + 3] = onwards[(i, 0)] * m[3] + onwards[(i, 1)] * m[4];
         }
-        out
-    };
-    rows(&rows(m).transpose()).transpose()
+    }
+    out
 }
 
 /// Returns (I - K H) M, without the zeros and ones of the velocities, which are not measured.

@@ -73,14 +73,15 @@ impl FloorKalman {
         let position = Point3::new(place.x, place.y, state.height.0);
         let (velocity, velocity_covariance) = state.velocity();
         let mut covariance = SMatrix::<f64, 5, 5>::zeros();
-        let mut set = |row: usize, column: usize, block: &Matrix2<f64>| {
-            covariance.fixed_view_mut::<2, 2>(row, column).copy_from(&turned(&turn, block));
-        };
-        set(0, 0, &state.position_covariance());
-        set(3, 3, &velocity_covariance);
         let cross = state.covariance.fixed_view::<2, 2>(0, 2).into_owned();
-        set(0, 3, &cross);
-        set(3, 0, &cross.transpose());
+        for (row, column, block) in [
+            (0, 0, state.position_covariance()),
+            (3, 3, velocity_covariance),
+            (0, 3, cross),
+            (3, 0, cross.transpose()),
+        ] {
+            covariance.fixed_view_mut::<2, 2>(row, column).copy_from(&turned(&turn, &block));
+        }
         covariance[(2, 2)] = state.height.1;
         Estimate::new(
             Person { position, velocity: turn * velocity },

@@ -148,19 +148,21 @@ fn settings_that_cannot_work_are_refused() {
 /// errors of two posteriors: many walks, drawn and filtered.
 #[test]
 fn the_prediction_by_differences_is_as_uncertain_as_it_says() {
-    fn noisy(at: Vector2<f64>, n: &mut dyn FnMut() -> f64) -> Vector2<f64> {
-        at + Vector2::new(n(), n()) * 0.02_f64.sqrt()
+    /// Draws from the sum of twelve uniform numbers.
+    fn next_normal(random: &mut u64) -> f64 {
+        let uniform = (0..12).map(|_| {
+            *random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (*random >> 11) as f64 / (1u64 << 53) as f64
+        });
+        uniform.sum::<f64>() - 6.0
+    }
+
+    fn noisy(at: Vector2<f64>, random: &mut u64) -> Vector2<f64> {
+        at + Vector2::new(next_normal(random), next_normal(random)) * 0.02_f64.sqrt()
     }
 
     let config = Config { form: Form::LastDifference, ..Config::default() };
-    let mut state = 7u64;
-    let mut normal = move || {
-        let uniform = (0..12).map(|_| {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            (state >> 11) as f64 / (1u64 << 53) as f64
-        });
-        uniform.sum::<f64>() - 6.0
-    };
+    let mut random = 7_u64;
     let r = Matrix2::from_diagonal_element(0.02);
     let root = config.process(config.step_s).cholesky().unwrap().l();
     let mut squares = 0.0;
@@ -168,15 +170,15 @@ fn the_prediction_by_differences_is_as_uncertain_as_it_says() {
     let mut said = 0.0;
     for _ in 0..4000 {
         let mut truth = [Vector2::zeros(), Vector2::new(0.1, 0.0)];
-        let mut state = State::new(noisy(truth[1], &mut normal), &r, (1.6, 0.01), &config);
+        let mut state = State::new(noisy(truth[1], &mut random), &r, (1.6, 0.01), &config);
         for step in 0..3 {
-            let noise = root * Vector2::new(normal(), normal());
+            let noise = root * Vector2::new(next_normal(&mut random), next_normal(&mut random));
             // The first step of the filter knows no difference, and so has none.
             let u = if step == 0 { Vector2::zeros() } else { truth[1] - truth[0] };
             truth = [truth[1], truth[1] + u + noise];
             state.predict(config.step_s, &Matrix2::zeros(), &config);
             if step < 2 {
-                state.correct(&noisy(truth[1], &mut normal), &r, config.form);
+                state.correct(&noisy(truth[1], &mut random), &r, config.form);
             }
         }
         squares += (state.position() - truth[1]).norm_squared();
@@ -268,13 +270,10 @@ fn four_states_are_those_of_a_filter_written_down() {
     let speed = config.initial_speed_mps;
     let mut filter = FloorKalman::new(config).unwrap();
     let r = Matrix2::new(0.05, 0.02, 0.02, 0.03);
-    let sighting = |x: f64, y: f64| {
-        let mut covariance = Matrix3::from_diagonal_element(0.02);
-        covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&r);
-        sighting(x, y).with_covariance(covariance)
-    };
+    let mut of_sighting = Matrix3::from_diagonal_element(0.02);
+    of_sighting.fixed_view_mut::<2, 2>(0, 0).copy_from(&r);
     let mut room_from_robot = Isometry2::new(Vector2::zeros(), -30.0_f64.to_radians());
-    filter.start(ID, &sighting(2.0, 1.0), &camera());
+    filter.start(ID, &sighting(2.0, 1.0).with_covariance(of_sighting), &camera());
     let start = room_from_robot * Point2::new(2.0, 1.0);
     let mut covariance = DMatrix::from_diagonal_element(4, 4, speed * speed);
     let first = turn(&room_from_robot) * r * turn(&room_from_robot).transpose();
@@ -304,22 +303,21 @@ fn four_states_are_those_of_a_filter_written_down() {
         let z = room_from_robot * Point2::new(x, y);
         let of_room = rotation * r * rotation.transpose();
         let expected = book.correct(&DVector::from_vec(vec![z.x, z.y]), &dynamic(&of_room));
-        let (nis, degrees) = see(&mut filter, &sighting(x, y));
+        let seen = sighting(x, y).with_covariance(of_sighting);
+        let (nis, degrees) = see(&mut filter, &seen);
         assert!((nis - expected).abs() < 1e-9 && degrees == 2, "{nis} {expected}");
         let found = estimate(&filter);
         let place = room_from_robot.inverse() * Point2::new(book.mean[0], book.mean[1]);
         let velocity = rotation.transpose() * Vector2::new(book.mean[2], book.mean[3]);
         assert!((found.person.position.xy() - place).norm() < 1e-9);
         assert!((found.person.velocity - velocity).norm() < 1e-9);
-        let block = |row: usize, column: usize| {
-            let of_book = book.covariance.fixed_view::<2, 2>(row, column).into_owned();
-            rotation.transpose() * of_book * rotation
-        };
         for (row, column) in [(0, 0), (0, 2), (2, 0), (2, 2)] {
             let i = row + row / 2;
             let j = column + column / 2;
+            let of_book = book.covariance.fixed_view::<2, 2>(row, column).into_owned();
+            let of_book = rotation.transpose() * of_book * rotation;
             let of_filter = found.covariance.fixed_view::<2, 2>(i, j).into_owned();
-            assert!((of_filter - block(row, column)).norm() < 1e-9, "{row} {column}");
+            assert!((of_filter - of_book).norm() < 1e-9, "{row} {column}");
         }
     }
 }
@@ -366,19 +364,21 @@ fn polar_noise_lies_along_the_ray_however_the_robot_is_turned() {
         sigma_bearing_deg: 2.0,
         ..Config::default()
     };
-    let spread = |x: f64, y: f64, along: Vector2<f64>| {
+    let angle = 2.0_f64.to_radians();
+    // No person is nearer than the robot's own size.
+    for (at, along, expected) in [
+        ([3.0, -4.0], Vector2::new(0.6, -0.8), [0.7, 5.0 * angle]),
+        ([0.05, 0.0], Vector2::x(), [0.205, 0.1 * angle]),
+    ] {
         let mut filter = FloorKalman::new(config.clone()).unwrap();
-        filter.start(ID, &sighting(x, y), &camera());
+        filter.start(ID, &sighting(at[0], at[1]), &camera());
         let c = estimate(&filter).covariance.fixed_view::<2, 2>(0, 0).into_owned();
         let across = Vector2::new(-along.y, along.x);
-        (along.dot(&(c * along)).sqrt(), across.dot(&(c * across)).sqrt())
-    };
-    let angle = 2.0_f64.to_radians();
-    let (along, across) = spread(3.0, -4.0, Vector2::new(0.6, -0.8));
-    assert!((along - 0.7).abs() < 1e-9 && (across - 5.0 * angle).abs() < 1e-9, "{along} {across}");
-    // No person is nearer than the robot's own size.
-    let (along, across) = spread(0.05, 0.0, Vector2::x());
-    assert!((along - 0.205).abs() < 1e-9 && (across - 0.1 * angle).abs() < 1e-9);
+        for (axis, expected) in [along, across].iter().zip(expected) {
+            let sigma = axis.dot(&(c * axis)).sqrt();
+            assert!((sigma - expected).abs() < 1e-9, "{sigma} {expected}");
+        }
+    }
 }
 
 /// The error that `last-difference` states, against the recursion of the joint covariance of two

@@ -75,8 +75,9 @@ impl Models {
         let old: Vec<(f64, State)> =
             self.0.iter().map(|model| (model.weight, model.state.clone())).collect();
         for (to, model) in self.0.iter_mut().enumerate() {
-            let by = |from: usize| if from == to { 1.0 - change } else { change / others as f64 };
-            let joint = old.iter().enumerate().map(|(from, (weight, _))| weight * by(from));
+            let joint = old.iter().enumerate().map(|(from, (weight, _))| {
+                weight * if from == to { 1.0 - change } else { change / others as f64 }
+            });
             model.weight = joint.clone().sum();
             let parts = joint.map(|joint| joint / model.weight);
             model.state.take_mixture(parts.zip(old.iter().map(|(_, state)| state)));

@@ -66,9 +66,9 @@ impl Gap {
 fn between(from: &Detection, to: &Detection, part: f64, camera: &Camera) -> Detection {
     let a = from.rect_in(camera);
     let b = to.rect_in(camera);
-    let mix = |a: f64, b: f64| a + part * (b - a);
-    let rect =
-        Rect::new(mix(a.x, b.x), mix(a.y, b.y), mix(a.width, b.width), mix(a.height, b.height));
+    let sides = [(a.x, b.x), (a.y, b.y), (a.width, b.width), (a.height, b.height)];
+    let [x, y, width, height] = sides.map(|(a, b)| a + part * (b - a));
+    let rect = Rect::new(x, y, width, height);
     let position = from.position + (to.position - from.position) * part;
     let image = to.image.map(|image| ImageBox { rect, ..image });
     to.clone().with_image(image).with_position(position)

@@ -143,10 +143,9 @@ pub(crate) fn range(
 
 /// Returns the derivative of the viewing ray with respect to the pixel.
 fn ray_slope(camera: &Camera, pixel: Point2<f64>) -> Matrix3x2<f64> {
-    let ray = |dx: f64, dy: f64| camera.ray(pixel + Vector2::new(dx, dy));
-    let by_x = ray(0.5, 0.0) - ray(-0.5, 0.0);
-    let by_y = ray(0.0, 0.5) - ray(0.0, -0.5);
-    Matrix3x2::from_columns(&[by_x, by_y])
+    let [right, left, below, above] = [(0.5, 0.0), (-0.5, 0.0), (0.0, 0.5), (0.0, -0.5)]
+        .map(|(dx, dy)| camera.ray(pixel + Vector2::new(dx, dy)));
+    Matrix3x2::from_columns(&[right - left, below - above])
 }
 
 fn pixels_per_ray(camera: &Camera, pixel: Point2<f64>) -> Option<Matrix2<f64>> {

@@ -38,11 +38,13 @@ fn fed(config: Config, sightings: &[Detection], motion: EgoMotion) -> State {
 /// Detections of a box that moves by 120 pixels a second.
 fn sliding(frames: usize) -> Vec<Detection> {
     let start = person(Point3::new(4.0, 1.0, 1.6));
-    let shifted = |i: usize| Rect {
-        x: start.rect().unwrap().x + 120.0 * DT_S * i as f64,
-        ..start.rect().unwrap()
-    };
-    (0..frames).map(|i| start.clone().with_image(ImageBox::upper_body(shifted(i)))).collect()
+    let region = start.rect().unwrap();
+    (0..frames)
+        .map(|i| {
+            let shifted = Rect { x: region.x + 120.0 * DT_S * i as f64, ..region };
+            start.clone().with_image(ImageBox::upper_body(shifted))
+        })
+        .collect()
 }
 
 #[test]
@@ -93,15 +95,12 @@ fn whoever_the_robot_turns_its_back_on_is_found_again_where_they_were() {
     let camera = camera();
     let place = Point3::new(3.0, 0.2, 1.6);
     let mut state = fed(config.clone(), &vec![person(place); 10], EgoMotion::at_rest(DT_S));
-    let turn = |state: &mut State, turn: f64| {
+    let [gone, back] = [0.15, -0.15].map(|turn| {
         let motion = EgoMotion { turn, ..EgoMotion::at_rest(DT_S) };
         (0..20).for_each(|_| state.predict(&config, &motion, &camera));
-    };
-    turn(&mut state, 0.15);
-    let gone = state.estimate(&camera);
+        state.estimate(&camera)
+    });
     assert!(gone.person.position.x < -2.0 && gone.region.area() == 0.0, "{gone:?}");
-    turn(&mut state, -0.15);
-    let back = state.estimate(&camera);
     assert!((back.person.position - place).norm() < 0.05, "{back:?}");
     assert!(back.region.iou(&person(place).rect().unwrap()) > 0.9);
 }
@@ -300,10 +299,10 @@ fn a_step_is_that_of_the_textbook() {
     let second =
         farther.with_image(ImageBox::upper_body(Rect::new(x + 5.0, y - 3.0, width + 4.0, height)));
     let mut state = State::start(&config, &first, &camera);
-    let noise = |width: f64| (config.sigma_centre * width).powi(2);
+    let noise = (config.sigma_centre * width).powi(2);
     let speed = (config.initial_speed * width).powi(2);
     let centre = first.rect().unwrap().centre();
-    let mut lines = [centre.x, centre.y].map(|at| Line::start(at, noise(width), speed));
+    let mut lines = [centre.x, centre.y].map(|at| Line::start(at, noise, speed));
     let rate = config.initial_range_speed_mps.powi(2);
     let mut range = Line::start(4.0, config.sigma_range_m.powi(2), rate);
     let scale = (config.sigma_scale * width).powi(2);
@@ -317,7 +316,7 @@ fn a_step_is_that_of_the_textbook() {
 
     let support = state.correct(&config, &second, &camera);
     let seen = second.rect().unwrap().centre();
-    let mut nis = lines[0].correct(seen.x, noise(width)) + lines[1].correct(seen.y, noise(width));
+    let mut nis = lines[0].correct(seen.x, noise) + lines[1].correct(seen.y, noise);
     nis += range.correct(4.2, config.sigma_range_m.powi(2));
     nis += 16.0 / (wandered + scale);
     let (found, freedom) = support.nis.unwrap();
@@ -342,22 +341,22 @@ fn doubts(range_m: f64, [forward, left, turn]: [f64; 3]) -> [f64; 3] {
     let ((camera, seen), config) = (ahead(range_m), Config::default());
     let sigmas = Vector3::new(forward, left, turn);
     let covariance = Matrix3::from_diagonal(&sigmas.component_mul(&sigmas));
-    let after = |covariance| {
+    let [with, without] = [covariance, Matrix3::zeros()].map(|covariance| {
         let mut state = State::start(&config, &seen, &camera);
         state.predict(&config, &EgoMotion { covariance, ..EgoMotion::at_rest(0.1) }, &camera);
         let p = &state.image_covariance;
         [p[(0, 0)], p[(1, 1)], state.range_covariance[(0, 0)]]
-    };
-    let with = after(covariance);
-    let without = after(Matrix3::zeros());
+    });
     std::array::from_fn(|i| with[i] - without[i])
 }
 
 #[test]
 fn errors_of_the_odometry_add_to_what_they_move() {
     fn near(found: [f64; 3], expected: [f64; 3]) {
-        let off = |i: usize| (found[i] - expected[i]).abs() < 1e-3 * expected[i].max(0.01);
-        assert!((0..3).all(off), "{found:?} {expected:?}");
+        for (found, expected) in found.iter().zip(expected) {
+            let off = (found - expected).abs();
+            assert!(off < 1e-3 * expected.max(0.01), "{found:?} {expected:?}");
+        }
     }
 
     near(doubts(4.0, [0.0, 0.0, 0.02]), [(525.0 * 0.02f64).powi(2), 0.0, 0.0]);
@@ -384,15 +383,15 @@ fn a_range_that_is_a_guess_makes_the_place_after_a_step_one() {
     let ((camera, sure), config) = (ahead(4.0), Config::default());
     let guess = sure.clone().with_covariance(Matrix3::from_diagonal(&Vector3::new(1.0, 0.0, 0.0)));
     let step = EgoMotion { left: 0.4, ..EgoMotion::at_rest(1e-3) };
-    let sigma = |seen: &Detection| {
+    let [of_guess, of_sure] = [&guess, &sure].map(|seen| {
         let mut state = State::start(&config, seen, &camera);
         let before = state.image_covariance[(0, 0)];
         state.predict(&config, &step, &camera);
         (state.image_covariance[(0, 0)] - before).max(0.0).sqrt()
-    };
+    });
     let expected = 525.0 * 0.4 * (1.0 / 4.0 - 1.0 / 5.0);
-    assert!((sigma(&guess) - expected).abs() < 0.5, "{} {expected}", sigma(&guess));
-    assert!(sigma(&sure) < 0.5, "{}", sigma(&sure));
+    assert!((of_guess - expected).abs() < 0.5, "{of_guess} {expected}");
+    assert!(of_sure < 0.5, "{of_sure}");
 }
 
 #[test]
@@ -478,9 +477,9 @@ proptest! {
         let unit = toward.normalize();
         let found = estimate.covariance.fixed_view::<3, 3>(0, 0).into_owned();
         // Correlation of range and direction is left out, the rest is kept.
-        let along = |m: Matrix3<f64>| unit.dot(&(m * unit));
+        let [found_along, seen_along] = [found, covariance].map(|m| unit.dot(&(m * unit)));
         let across = Matrix3::identity() - unit * unit.transpose();
-        prop_assert!((along(found) - along(covariance)).abs() < 1e-4);
+        prop_assert!((found_along - seen_along).abs() < 1e-4);
         let off = across * (found - covariance) * across;
         prop_assert!(off.norm() < 1e-3 * covariance.norm(), "{off}");
     }
@@ -509,10 +508,7 @@ fn after_a_gap(reupdate: bool, reached: u32) -> f64 {
     let config = Config { reupdate, ..Config::default() };
     let mut filter = ImageKalman::new(config).unwrap();
     filter.start(TrackId(1), &seen, &camera);
-    let at = |x: f64| {
-        let Rect { width, height, .. } = seen.rect().unwrap();
-        seen.clone().with_image(ImageBox::upper_body(Rect::new(x, 100.0, width, height)))
-    };
+    let Rect { width, height, .. } = seen.rect().unwrap();
     let camera = Arc::new(camera);
     for index in 1..=20_u32 {
         let motion = EgoMotion::at_rest(0.1);
@@ -520,7 +516,9 @@ fn after_a_gap(reupdate: bool, reached: u32) -> f64 {
         if (11..20).contains(&index) {
             continue;
         }
-        let found = at(4.0 * f64::from(if index == 20 { reached } else { index }));
+        let x = 4.0 * f64::from(if index == 20 { reached } else { index });
+        let region = Rect::new(x, 100.0, width, height);
+        let found = seen.clone().with_image(ImageBox::upper_body(region));
         let stamp = Stamp::default();
         let frame = Frame::new(index.into(), stamp, Arc::clone(&camera), motion, Images::default());
         let matched = [Matched::certain(TrackId(1), &found)];
@@ -585,16 +583,14 @@ fn a_velocity_may_decay() {
 
 #[test]
 fn a_shaking_camera_moves_boxes_and_gives_them_no_velocity() {
-    let after = |position_noise: f64| {
+    let [still, shaken] = [0.0, 0.5].map(|position_noise| {
         let config = Config { position_noise, ..Config::default() };
         let mut state = State::start(&config, &ahead(4.0).1, &ahead(4.0).0);
         let before = state.image_covariance;
         let width = state.image[4];
         state.predict(&config, &EgoMotion::at_rest(0.1), &camera());
         (state.image_covariance - before) / width.powi(2)
-    };
-    let still = after(0.0);
-    let shaken = after(0.5);
+    });
     for axis in 0..2 {
         let grown = shaken[(axis, axis)] - still[(axis, axis)];
         assert!((grown - 0.25 * 0.1).abs() < 1e-9, "{grown}");

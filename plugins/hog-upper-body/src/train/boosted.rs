@@ -22,11 +22,14 @@ pub(crate) fn boosted(
         table.push(chosen.iter().map(|i| windows.numbers[i * width + number]));
     }
     let mut boosting = Boosting::new(&table, chosen.iter().map(|i| windows.is_person[*i]));
-    let drawn = |tree: usize| -> Vec<usize> {
-        let number = |k: usize| mix(mix(seed ^ tree as u64) ^ k as u64) % width as u64;
-        (0..numbers).map(|k| number(k) as usize).collect()
-    };
-    (0..count).map(|tree| flat(&boosting.grow(&drawn(tree), 2))).collect()
+    let mut trees = Vec::with_capacity(count);
+    for tree in 0..count {
+        let seed = mix(seed ^ tree as u64);
+        let drawn: Vec<usize> =
+            (0..numbers).map(|k| (mix(seed ^ k as u64) % width as u64) as usize).collect();
+        trees.push(flat(&boosting.grow(&drawn, 2)));
+    }
+    trees
 }
 
 /// Converts a tree to the form that is run; a leaf in place of a question becomes a question with
@@ -37,14 +40,14 @@ fn flat(questions: &[Question]) -> Tree {
     }
 
     let mut tree = Tree::default();
-    let mut set = |at: usize, question: &Question| {
-        (tree.numbers[at], tree.below[at]) = (question.feature as u16, question.below);
-    };
-    set(0, &questions[0]);
+    let mut asked = vec![(0, &questions[0])];
     for (side, next) in questions[0].next.iter().enumerate() {
         if let Next::Question(to) = next {
-            set(1 + side, &questions[*to]);
+            asked.push((1 + side, &questions[*to]));
         }
+    }
+    for (at, question) in asked {
+        (tree.numbers[at], tree.below[at]) = (question.feature as u16, question.below);
     }
     for (side, next) in questions[0].next.iter().enumerate() {
         let pair = match next {
@@ -63,12 +66,22 @@ mod tests {
     #[test]
     fn a_leaf_in_place_of_a_question_answers_both_ways_alike() {
         let second = Question { feature: 5, below: 0.1, next: [Next::Leaf(-1.0), Next::Leaf(2.0)] };
-        let grown = |next: [Next; 2]| flat(&[Question { feature: 3, below: 0.5, next }, second]);
-        let tree = grown([Next::Question(1), Next::Leaf(0.75)]);
-        assert_eq!((tree.numbers, tree.below), ([3, 5, 0], [0.5, 0.1, 0.0]));
-        assert_eq!(tree.values, [-1.0, 2.0, 0.75, 0.75]);
-        let tree = grown([Next::Leaf(0.75), Next::Question(1)]);
-        assert_eq!((tree.numbers, tree.below), ([3, 0, 5], [0.5, 0.0, 0.1]));
-        assert_eq!(tree.values, [0.75, 0.75, -1.0, 2.0]);
+        for (next, numbers, below, values) in [
+            (
+                [Next::Question(1), Next::Leaf(0.75)],
+                [3, 5, 0],
+                [0.5, 0.1, 0.0],
+                [-1.0, 2.0, 0.75, 0.75],
+            ),
+            (
+                [Next::Leaf(0.75), Next::Question(1)],
+                [3, 0, 5],
+                [0.5, 0.0, 0.1],
+                [0.75, 0.75, -1.0, 2.0],
+            ),
+        ] {
+            let tree = flat(&[Question { feature: 3, below: 0.5, next }, second]);
+            assert_eq!((tree.numbers, tree.below, tree.values), (numbers, below, values));
+        }
     }
 }

@@ -53,11 +53,11 @@ impl DepthWindows {
 
     /// Fits trees to the windows of some rooms; `None` if these lack people or others.
     fn fit(&self, of_room: &dyn Fn(usize) -> bool, seed: u64) -> Option<DepthTrees> {
-        let has = |is: bool| {
-            let mut windows = self.fit.is_person.iter().zip(&self.fit.room);
-            windows.any(|(is_person, room)| *is_person == is && of_room(*room))
-        };
-        if !(has(true) && has(false)) {
+        let mut has = [false; 2];
+        for (is_person, room) in self.fit.is_person.iter().zip(&self.fit.room) {
+            has[usize::from(*is_person)] |= of_room(*room);
+        }
+        if has != [true; 2] {
             return None;
         }
         let mut depth = DepthTrees::new(boosted(&self.fit, of_room, TREES, NUMBERS, seed));

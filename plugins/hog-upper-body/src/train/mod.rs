@@ -147,14 +147,14 @@ impl HogTrainer {
             // In a picture hardly larger than a window, all windows are nearly the same.
             let count = if small < 2.0 * SMALLEST_PX { 1 } else { self.training.random_windows };
             for window in 0..count {
-                let part = |k: u64| {
+                let [size, across, down] = [0, 1, 2].map(|k| {
                     let number = mix(self.seed ^ mix((index * 1000 + window) as u64 * 4 + k));
                     (number >> 11) as f64 / (1_u64 << 53) as f64
-                };
+                });
                 // The square favours small windows, which are also the most numerous in a search.
-                let side = SMALLEST_PX + (small - SMALLEST_PX).max(0.0) * part(0).powi(2);
-                let x = part(1) * (picture.width() as f64 - side);
-                let y = part(2) * (picture.height() as f64 - side);
+                let side = SMALLEST_PX + (small - SMALLEST_PX).max(0.0) * size.powi(2);
+                let x = across * (picture.width() as f64 - side);
+                let y = down * (picture.height() as f64 - side);
                 let square = Rect::new(x, y, side, side);
                 self.windows.add(&window_numbers(picture, &square, self.layout), false, 0);
             }
@@ -211,8 +211,7 @@ impl HogTrainer {
         let mut sums: Vec<(f64, bool)> =
             people.map(|(_, numbers)| (sum_of(model, numbers, self.near_miss()), true)).collect();
         let mut scanner = Scanner::new(model);
-        let is_wanted = |picture: &&Picture| picture.use_ == wanted && picture.room == 0;
-        for picture in self.pictures.iter().filter(is_wanted) {
+        for picture in self.pictures.iter().filter(|p| p.use_ == wanted && p.room == 0) {
             let mut windows = search(&mut scanner, &picture.grey, self.near_miss());
             if merged {
                 merge(&mut windows, Coverage::UpperBody, MINED_OVERLAP, 1.0);
@@ -417,11 +416,11 @@ fn least_on_the_way(ways: &[Vec<f32>]) -> Vec<f32> {
         }
     }
     // For the person with the lowest sum, the lowest sum of the others is the second one.
-    let behind = |way: &Vec<f32>| {
-        let behind = way.iter().zip(&least_two).map(|(sum, [_, next])| next - sum);
-        behind.fold(0.0, f32::max)
-    };
-    let mut behind: Vec<f32> = ways.iter().map(behind).collect();
+    let mut behind = Vec::with_capacity(ways.len());
+    for way in ways {
+        let of_way = way.iter().zip(&least_two).map(|(sum, [_, next])| next - sum);
+        behind.push(of_way.fold(0.0, f32::max));
+    }
     behind.sort_by(|a, b| b.total_cmp(a));
     let margin = behind.get((GIVEN_UP * behind.len() as f64) as usize).copied().unwrap_or(0.0);
     least_two.iter().map(|[least, _]| least - margin).collect()
@@ -455,9 +454,10 @@ mod tests {
     fn the_miss_rate_is_that_at_the_allowed_number_of_false_alarms() {
         let people = [6.0, 4.0, 2.0, 0.0].map(|sum| (sum, true));
         let sums = [&people[..], &[5.0, 3.0, 1.0].map(|sum| (sum, false))].concat();
-        let missed = |rate: f64| miss_rate(&sums, 1000, rate, -1.0);
         // The second, the first and none of the others is the limit.
-        assert_eq!([missed(1e-3), missed(1e-5), missed(1e-2)], [0.5, 0.75, 0.0]);
+        for (rate, expected) in [(1e-3, 0.5), (1e-5, 0.75), (1e-2, 0.0)] {
+            assert_eq!(miss_rate(&sums, 1000, rate, -1.0), expected, "{rate}");
+        }
         assert_eq!(miss_rate(&[], 1000, 1e-3, -1.0), 0.0);
     }
 

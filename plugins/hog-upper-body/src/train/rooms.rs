@@ -142,17 +142,24 @@ mod tests {
     fn people_below_the_last_allowed_false_alarm_are_missed() {
         let mut verdicts =
             [(1.0, true), (9.0, true), (8.0, false), (7.0, true), (6.0, false), (5.0, true)];
-        let mut missed = |allowed: usize| missed_at(&mut verdicts, 5, allowed);
-        let found = [0, 1, 2].map(|allowed| ((1.0 - missed(allowed)) * 5.0).round());
-        assert_eq!(found, [1.0, 2.0, 4.0]);
+        for (allowed, expected) in [(0, 1.0), (1, 2.0), (2, 4.0)] {
+            let found = ((1.0 - missed_at(&mut verdicts, 5, allowed)) * 5.0).round();
+            assert_eq!(found, expected, "{allowed}");
+        }
     }
 
     #[test]
     fn a_window_on_a_person_who_does_not_count_is_no_false_alarm() {
         let square = Rect::new(10.0, 10.0, 40.0, 40.0);
         let inside = Rect::new(20.0, 20.0, 10.0, 10.0);
-        let is_shown = |counts: bool, window: Rect| Known { square, counts }.is_shown(&window);
-        assert!(is_shown(true, square) && !is_shown(true, inside) && is_shown(false, inside));
-        assert!(!is_shown(false, Rect::new(80.0, 10.0, 40.0, 40.0)));
+        let aside = Rect::new(80.0, 10.0, 40.0, 40.0);
+        for (counts, window, expected) in [
+            (true, square, true),
+            (true, inside, false),
+            (false, inside, true),
+            (false, aside, false),
+        ] {
+            assert_eq!(Known { square, counts }.is_shown(&window), expected, "{counts} {window:?}");
+        }
     }
 }

@@ -44,9 +44,12 @@ pub(crate) fn separate(
     let mut weights = vec![0.0_f32; width];
     let mut bias = 0.0_f32;
     let mut alphas = vec![0.0_f32; windows.len()];
-    let row = |i: usize| &windows.numbers[i * width..(i + 1) * width];
-    // The bias is the weight of a constant value 1, which adds 1 to each squared length.
-    let lengths: Vec<f32> = (0..windows.len()).map(|i| dot(row(i), row(i)) + 1.0).collect();
+    let mut lengths = Vec::with_capacity(windows.len());
+    for i in 0..windows.len() {
+        let row = &windows.numbers[i * width..(i + 1) * width];
+        // The bias is the weight of a constant value 1, which adds 1 to each squared length.
+        lengths.push(dot(row, row) + 1.0);
+    }
     let mut order: Vec<usize> = (0..windows.len()).collect();
     for epoch in 0..epochs {
         shuffle(&mut order, seed.wrapping_add(epoch as u64));
@@ -54,7 +57,8 @@ pub(crate) fn separate(
         for &i in &order {
             let sign = if windows.is_person[i] { 1.0 } else { -1.0 };
             let softness = (0.5 / penalty[usize::from(windows.is_person[i])]) as f32;
-            let sum = dot(&weights, row(i)) + bias;
+            let row = &windows.numbers[i * width..(i + 1) * width];
+            let sum = dot(&weights, row) + bias;
             let slope = sign * sum - 1.0 + softness * alphas[i];
             let wanted = (alphas[i] - slope / (lengths[i] + softness)).max(0.0);
             let step = (wanted - alphas[i]) * sign;
@@ -63,7 +67,7 @@ pub(crate) fn separate(
             }
             most = most.max(slope.abs());
             alphas[i] = wanted;
-            weights.iter_mut().zip(row(i)).for_each(|(w, v)| *w += step * v);
+            weights.iter_mut().zip(row).for_each(|(w, v)| *w += step * v);
             bias += step;
         }
         if most < STILL {
@@ -99,17 +103,19 @@ mod tests {
             .sum::<f64>()
     }
 
+    /// Draws a number between -0.5 and 0.5.
+    fn next_number(state: &mut u64) -> f32 {
+        *state = tagalong_learn::mix(state.wrapping_add(1));
+        (*state >> 40) as f32 / (1_u64 << 24) as f32 - 0.5
+    }
+
     #[test]
     fn no_small_step_makes_the_solution_better() {
         let mut windows = Windows::default();
         let mut state = 5_u64;
-        let mut next = || {
-            state = tagalong_learn::mix(state.wrapping_add(1));
-            (state >> 40) as f32 / (1_u64 << 24) as f32 - 0.5
-        };
         for i in 0..200 {
             let shift = if i % 2 == 0 { 0.3 } else { -0.3 };
-            let numbers: Vec<f32> = (0..6).map(|_| next() + shift).collect();
+            let numbers: Vec<f32> = (0..6).map(|_| next_number(&mut state) + shift).collect();
             windows.add(&numbers, i % 2 == 0, 0);
         }
         let penalty = [0.5, 1.0];

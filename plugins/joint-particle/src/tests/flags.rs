@@ -138,18 +138,12 @@ fn faces(config: Config, people: usize, walks: Vector2<f64>) -> Vector2<f64> {
             0.1 * walks.y * f64::from(frame),
             1.6,
         );
-        let log = move |scene: &[Person]| {
-            let place = |p: &Person| {
-                if p.position.x < 2.5 {
-                    -0.5 * ((p.position - at).norm() / 0.03).powi(2)
-                } else {
-                    0.0
-                }
-            };
+        rig.look(&Formula::new(move |scene: &[Person]| {
+            let near = scene.iter().filter(|p| p.position.x < 2.5);
+            let places = near.map(|p| -0.5 * ((p.position - at).norm() / 0.03).powi(2));
             let turned = scene.iter().filter(|p| p.velocity.y > 0.3).count();
-            scene.iter().map(place).sum::<f64>() + 3.0 * turned as f64
-        };
-        rig.look(&Formula::new(log));
+            places.sum::<f64>() + 3.0 * turned as f64
+        }));
     }
     let likelihood = Formula::flat(3.0);
     rig.look(&likelihood);
@@ -162,20 +156,20 @@ fn bodies_face_where_the_image_says_or_where_they_walk() {
     let right = Vector2::new(0.0, -1.0);
     let lively = Config { initial_velocity_variance: 4.0, acceleration_noise: 4.0, ..drawn() };
     let lively = Config { marginalise: true, max_particles: 1000, particles: 1000, ..lively };
-    let by = |facing_by_image, people, walks| {
-        faces(Config { facing_by_image, ..lively.clone() }, people, walks)
-    };
-    assert!(by(true, 1, right).y > 0.9, "by the image");
-    assert!(by(false, 1, right).y < -0.3, "where the track walks: {}", by(false, 1, right));
-    assert!(by(false, 2, right).y < -0.3);
+    let [by_image, by_track, of_two] =
+        [(true, 1), (false, 1), (false, 2)].map(|(facing_by_image, people)| {
+            faces(Config { facing_by_image, ..lively.clone() }, people, right).y
+        });
+    assert!(by_image > 0.9, "by the image");
+    assert!(by_track < -0.3 && of_two < -0.3, "where the track walks: {by_track} {of_two}");
     let still = Vector2::zeros();
-    let calm =
-        Config { initial_velocity_variance: 0.01, acceleration_noise: 0.1, ..lively.clone() };
-    let by = |facing_by_image, people, walks| {
-        faces(Config { facing_by_image, ..calm.clone() }, people, walks)
-    };
-    assert!(by(false, 1, still).y > 0.9, "who stands alone is looked at");
-    assert_eq!(by(false, 2, still), still, "who stands with others faces as before");
+    let [of_one, of_two] = [1, 2].map(|people| {
+        let calm =
+            Config { initial_velocity_variance: 0.01, acceleration_noise: 0.1, ..lively.clone() };
+        faces(Config { facing_by_image: false, ..calm }, people, still)
+    });
+    assert!(of_one.y > 0.9, "who stands alone is looked at");
+    assert_eq!(of_two, still, "who stands with others faces as before");
 }
 
 #[test]
@@ -331,10 +325,9 @@ fn a_scheme_may_report_the_prediction() {
         rig.start(1, [2.0, 0.0, 1.6], [EXACT; 3]);
         for frame in 1..12 {
             let at = Point3::new(2.0, 0.1 * f64::from(frame), 1.6);
-            let log = move |scene: &[Person]| {
+            rig.look(&Formula::new(move |scene: &[Person]| {
                 scene.iter().map(|p| -0.5 * ((p.position - at).norm() / 0.04).powi(2)).sum()
-            };
-            rig.look(&Formula::new(log));
+            }));
         }
         rig.place(1).y - 1.1
     }
@@ -367,12 +360,10 @@ fn table_places(config: Config) -> Vec<Point3<f64>> {
 
 #[test]
 fn places_lie_across_the_viewing_ray_or_along_the_axis_of_a_scheme() {
-    let ends = |config| {
+    let [across, along] = [drawn(), other()].map(|config| {
         let places = table_places(config);
         places[1280] - places[0]
-    };
-    let across = ends(drawn());
-    let along = ends(other());
+    });
     let half = 0.6 / 2f64.sqrt();
     assert!((across.xy() - Vector2::new(-half, half)).norm() < 0.02, "{across}");
     assert!((along.xy() - Vector2::new(0.0, 0.6)).norm() < 1e-9, "{along}");
@@ -388,12 +379,7 @@ fn the_compared_places_of_both_count_from_the_near_one() {
     let likelihood = Formula::flat(3.0);
     rig.look(&likelihood);
     let asked: Vec<Vec<Person>> = likelihood.asked().into_iter().take(1281).collect();
-    let span = |person: usize| {
-        let of = |scene: &Vec<Person>| scene[person].position.y;
-        [of(&asked[0]), of(&asked[1280])]
-    };
-    let near = span(1);
-    let far = span(0);
+    let [near, far] = [1, 0].map(|person| [0, 1280].map(|at| asked[at][person].position.y));
     assert!((near[0] + 0.3).abs() < 0.02 && (near[1] - 0.3).abs() < 0.02, "{near:?}");
     assert!((far[0] + 0.9).abs() < 0.02 && (far[1] - 0.9).abs() < 0.02, "{far:?}");
     assert!(asked.iter().all(|scene| (scene[0].position.z - 1.7).abs() < 0.01));
@@ -411,7 +397,6 @@ fn walked(swap_margin: f64, mirrored: bool) -> Rig {
 
     let config = Config { from_detection: 1.0, swap_margin, ..Config::default() };
     let mut rig = Rig::new(config, 1);
-    let at = |y: f64| sighting(Point3::new(2.0, y, 1.6), [0.02; 3]);
     rig.start(1, [2.0, 0.7, 1.6], [0.02; 3]);
     rig.start(2, [2.0, -0.7, 1.6], [0.02; 3]);
     fn image(mirrored: bool) -> Option<RgbImage> {
@@ -419,14 +404,12 @@ fn walked(swap_margin: f64, mirrored: bool) -> Rig {
             if (x < 50) != mirrored { [200, 20, 20] } else { [20, 20, 200] }
         }))
     }
-    let mut look = |y: f64, mirrored| {
-        let sightings = [(1, at(y)), (2, at(-y))];
+    let before = [0.7, 0.1, 0.1].map(|y| (y, false));
+    for (y, mirrored) in before.into_iter().chain([(0.7, mirrored); 4]) {
+        let sightings =
+            [(1, y), (2, -y)].map(|(id, y)| (id, sighting(Point3::new(2.0, y, 1.6), [0.02; 3])));
         rig.look_after(EgoMotion::at_rest(0.1), &Formula::new(facing), &sightings, image(mirrored));
-    };
-    look(0.7, false);
-    look(0.1, false);
-    look(0.1, false);
-    (0..4).for_each(|_| look(0.7, mirrored));
+    }
     rig
 }
 
@@ -442,10 +425,10 @@ fn people_who_come_out_with_each_others_colours_get_each_others_names() {
     let likelihood = Formula::flat(5.0);
     crossed.look(&likelihood);
     let asked = likelihood.asked();
-    let faces = |left: bool| {
+    let [left, right] = [true, false].map(|left| {
         asked.iter().flatten().find(|p| (p.position.y > 0.0) == left).unwrap().velocity.y
-    };
-    assert!(faces(true).abs() < 1e-9 && faces(false) > 0.9, "{} {}", faces(true), faces(false));
+    });
+    assert!(left.abs() < 1e-9 && right > 0.9, "{left} {right}");
 }
 
 #[test]

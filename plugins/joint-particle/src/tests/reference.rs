@@ -142,15 +142,14 @@ impl Grid {
 
     /// Both people are moved by independent normal noise.
     fn predict(&mut self, sigma: f64) {
-        let moves = |a: usize, b: usize| normal(Self::at(a) - Self::at(b), sigma);
-        let kernel: Vec<f64> = (0..SIDE * SIDE).map(|n| moves(n / SIDE, n % SIDE)).collect();
+        let kernel: Vec<f64> = (0..SIDE * SIDE)
+            .map(|n| normal(Self::at(n / SIDE) - Self::at(n % SIDE), sigma))
+            .collect();
         let old = std::mem::take(&mut self.cells);
-        let cell = |i: usize, j: usize, of: &[f64]| -> f64 {
-            (0..SIDE).map(|k| kernel[i * SIDE + k] * of[k * SIDE + j]).sum()
-        };
-        let near: Vec<f64> = (0..SIDE * SIDE).map(|n| cell(n / SIDE, n % SIDE, &old)).collect();
+        let near: Vec<f64> =
+            (0..SIDE * SIDE).map(|n| blurred_cell(&kernel, &old, n / SIDE, n % SIDE)).collect();
         let turned: Vec<f64> = (0..SIDE * SIDE).map(|n| near[n % SIDE * SIDE + n / SIDE]).collect();
-        let far = (0..SIDE * SIDE).map(|n| cell(n % SIDE, n / SIDE, &turned));
+        let far = (0..SIDE * SIDE).map(|n| blurred_cell(&kernel, &turned, n % SIDE, n / SIDE));
         self.cells = far.collect();
     }
 
@@ -162,19 +161,26 @@ impl Grid {
         self.cells.iter_mut().for_each(|cell| *cell /= sum);
     }
 
+    /// Returns the expected value of a function of the places of both people.
+    fn expected(&self, value: impl Fn(f64, f64) -> f64) -> f64 {
+        let each = self.cells.iter().enumerate();
+        each.map(|(n, cell)| cell * value(Self::at(n / SIDE), Self::at(n % SIDE))).sum()
+    }
+
     /// Mean and standard deviation of the near and the far person.
     fn moments(&self) -> [(f64, f64); 2] {
-        let expected = |value: &dyn Fn(f64, f64) -> f64| -> f64 {
-            let each = self.cells.iter().enumerate();
-            each.map(|(n, cell)| cell * value(Self::at(n / SIDE), Self::at(n % SIDE))).sum()
-        };
-        let near = expected(&|near, _| near);
-        let far = expected(&|_, far| far);
+        let near = self.expected(|near, _| near);
+        let far = self.expected(|_, far| far);
         [
-            (near, expected(&|at, _| (at - near).powi(2)).sqrt()),
-            (far, expected(&|_, at| (at - far).powi(2)).sqrt()),
+            (near, self.expected(|at, _| (at - near).powi(2)).sqrt()),
+            (far, self.expected(|_, at| (at - far).powi(2)).sqrt()),
         ]
     }
+}
+
+/// Returns the sum of a column of cells weighted by a row of the kernel.
+fn blurred_cell(kernel: &[f64], cells: &[f64], row: usize, column: usize) -> f64 {
+    (0..SIDE).map(|k| kernel[row * SIDE + k] * cells[k * SIDE + column]).sum()
 }
 
 fn normal(off: f64, sigma: f64) -> f64 {

@@ -45,13 +45,16 @@ pub fn trials(
     let parts = parts(samples.iter().map(|s| s.example), training.folds, seed);
     let each = training.gammas.iter().flat_map(|g| training.penalties.iter().map(|c| (*g, *c)));
     let grid: Vec<(f64, f64)> = each.collect();
-    let attempt = |&(gamma, penalty): &(f64, f64)| {
-        let held_out = hold_out(samples, &parts, training.folds, |fitted| {
-            solver::fit(fitted, sampler, gamma, penalty)
-        })?;
-        Ok(Trial { gamma, penalty, held_out })
-    };
-    side_by_side(&grid, attempt, progress)
+    side_by_side(
+        &grid,
+        |&(gamma, penalty)| {
+            let held_out = hold_out(samples, &parts, training.folds, |fitted| {
+                solver::fit(fitted, sampler, gamma, penalty)
+            })?;
+            Ok(Trial { gamma, penalty, held_out })
+        },
+        progress,
+    )
 }
 
 fn hold_out(
@@ -62,8 +65,8 @@ fn hold_out(
 ) -> Result<Vec<(f64, bool)>> {
     let mut values = Vec::with_capacity(samples.len());
     for fold in 0..folds {
-        let is_out = |s: &&&Sample| parts.get(&s.example.group) == Some(&fold);
-        let (out, rest): (Vec<&Sample>, Vec<&Sample>) = samples.iter().partition(|s| is_out(s));
+        let (out, rest): (Vec<&Sample>, Vec<&Sample>) =
+            samples.iter().partition(|s| parts.get(&s.example.group) == Some(&fold));
         let model = fit(&rest)?;
         values.extend(out.iter().map(|s| (model.decision(&s.patch), s.example.is_person)));
     }
@@ -73,7 +76,7 @@ fn hold_out(
 /// Selects at most `most` samples, half of each class while there are enough, in the order of a
 /// hash. A class with fewer leaves its share to the other.
 pub fn subset(samples: &[Sample], most: usize, seed: u64) -> Vec<&Sample> {
-    let of_class = |is_person: bool| {
+    let [mut people, mut others] = [true, false].map(|is_person| {
         // Sorting by a hash is a random order that is the same on every machine.
         let mut class: Vec<(u64, &Sample)> = samples
             .iter()
@@ -83,9 +86,7 @@ pub fn subset(samples: &[Sample], most: usize, seed: u64) -> Vec<&Sample> {
             .collect();
         class.sort_by_key(|(key, _)| *key);
         class.into_iter().map(|(_, s)| s).collect::<Vec<_>>()
-    };
-    let mut people = of_class(true);
-    let mut others = of_class(false);
+    });
     let half = most / 2;
     let spare_people = half.saturating_sub(people.len());
     let spare_others = half.saturating_sub(others.len());
@@ -134,30 +135,30 @@ mod tests {
     #[test]
     fn so_many_of_each_class_are_left_by_chance() {
         let samples: Vec<Sample> = (0..100).map(|k| sample(k, k < 40)).collect();
-        let left = |most, seed| {
+        let cases = [([10, 25], 1), ([10, 25], 2), ([0, 5], 1), ([1000, 1000], 1)];
+        let [some, others, without_limit, all] = cases.map(|(most, seed)| -> Vec<u64> {
             let mut left = samples.clone();
             keep(&mut left, most, seed);
-            left.iter().map(|s| s.example.group).collect::<Vec<u64>>()
-        };
-        let some = left([10, 25], 1);
+            left.iter().map(|s| s.example.group).collect()
+        });
         assert_eq!(some.iter().filter(|k| **k < 40).count(), 25);
         assert_eq!(some.len(), 35);
         assert!(some.is_sorted(), "the order stays");
-        assert_ne!(some, left([10, 25], 2));
-        assert_eq!(left([0, 5], 1).len(), 65, "0 is all");
-        assert_eq!(left([1000, 1000], 1).len(), 100);
+        assert_ne!(some, others);
+        assert_eq!(without_limit.len(), 65, "0 is all");
+        assert_eq!(all.len(), 100);
     }
 
     #[test]
     fn a_subset_is_drawn_from_all_of_a_class() {
         let samples: Vec<Sample> = (0..100).map(|k| sample(k, k < 10)).collect();
-        let chosen = |seed| {
+        let [chosen, others] = [1, 2].map(|seed| -> Vec<u64> {
             let others = subset(&samples, 40, seed).into_iter().filter(|s| !s.example.is_person);
-            others.map(|s| s.example.group).collect::<Vec<u64>>()
-        };
-        let odd = chosen(1).iter().filter(|k| **k % 2 == 1).count();
+            others.map(|s| s.example.group).collect()
+        });
+        let odd = chosen.iter().filter(|k| **k % 2 == 1).count();
         assert!((5..=25).contains(&odd), "{odd} of 30");
-        assert_ne!(chosen(1), chosen(2));
+        assert_ne!(chosen, others);
     }
 
     #[test]

@@ -59,9 +59,11 @@ impl ClutterMap {
 
     /// Removes and returns the evidence at the nearest place within a radius, m.
     fn take(&mut self, at: &Point2<f64>, radius_m: f64) -> f64 {
-        let off = |place: &ClutterCell| (place.at - at).norm();
-        let near = self.places.iter().enumerate().filter(|(_, place)| off(place) <= radius_m);
-        match near.min_by(|(_, a), (_, b)| off(a).total_cmp(&off(b))) {
+        let places = self.places.iter().enumerate();
+        let near = places
+            .map(|(index, place)| (index, (place.at - at).norm()))
+            .filter(|(_, off_m)| *off_m <= radius_m);
+        match near.min_by(|(_, a), (_, b)| a.total_cmp(b)) {
             Some((index, _)) => self.places.swap_remove(index).log_odds,
             None => 0.0,
         }
@@ -80,9 +82,13 @@ mod tests {
     #[test]
     fn what_was_said_of_a_place_adds_up_to_a_limit() {
         let mut clutter = ClutterMap::default();
-        let mut hear = |score| clutter.add_evidence(&scored(score, person(3.0, 0.0)), &settings());
-        assert_eq!([-2.0, -3.0, -4.0].map(&mut hear), [-2.0, -5.0, -9.0]);
-        assert_eq!([4.0, 1.0, 3.0, 3.0].map(hear), [-2.0, -1.0, 2.0, 3.0], "from -6 on");
+        let until_the_limit = [(-2.0, -2.0), (-3.0, -5.0), (-4.0, -9.0)];
+        // From -6 on.
+        let afterwards = [(4.0, -2.0), (1.0, -1.0), (3.0, 2.0), (3.0, 3.0)];
+        for (score, expected) in until_the_limit.into_iter().chain(afterwards) {
+            let said = clutter.add_evidence(&scored(score, person(3.0, 0.0)), &settings());
+            assert_eq!(said, expected, "{score}");
+        }
     }
 
     #[test]

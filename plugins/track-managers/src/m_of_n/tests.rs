@@ -153,32 +153,38 @@ fn scores_are_smoothed_and_misses_speak_against_a_person() {
 
 #[test]
 fn a_track_ends_by_its_score_only_below_the_limit() {
-    let ends = |log_odds: f64| {
+    for (log_odds, expected) in [(-2.0, vec![]), (-2.1, vec!["track: score"])] {
         let config = Config { score_weight: 1.0, ..Config::default() };
-        live(config, 5.0, &[Observation::Detected { log_odds }]).1
-    };
-    assert_eq!((ends(-2.0), ends(-2.1)), (vec![], vec!["track: score"]));
+        let (_, ends) = live(config, 5.0, &[Observation::Detected { log_odds }]);
+        assert_eq!(ends, expected, "{log_odds}");
+    }
 }
 
 #[test]
 fn a_track_that_is_not_confirmed_ends_at_its_second_miss() {
-    let after =
-        |score, misses| live(Config::default(), score, &vec![Observation::Missed; misses]).1;
-    assert_eq!(after(0.5, 1), Vec::<&str>::new());
-    assert_eq!(after(0.5, 2), ["track: not confirmed"]);
-    assert_eq!(after(5.0, 2), Vec::<&str>::new());
+    for (score, misses, expected) in
+        [(0.5, 1, vec![]), (0.5, 2, vec!["track: not confirmed"]), (5.0, 2, vec![])]
+    {
+        let (_, ends) = live(Config::default(), score, &vec![Observation::Missed; misses]);
+        assert_eq!(ends, expected, "{score} {misses}");
+    }
 }
 
 #[test]
 fn a_hidden_track_is_kept_longer_than_one_that_should_be_seen() {
-    let after = |one, frames| live(Config::default(), 5.0, &vec![one; frames]).1;
-    assert_eq!(after(Observation::Missed, 8), Vec::<&str>::new());
-    assert_eq!(after(Observation::Missed, 9), ["track: not seen"]);
-    assert_eq!(after(Observation::OutOfView, 16), Vec::<&str>::new());
-    assert_eq!(after(Observation::OutOfView, 17), ["track: left the image"]);
-    assert_eq!(after(Observation::Occluded, 24), Vec::<&str>::new());
-    assert_eq!(after(Observation::Occluded, 25), ["track: hidden too long"]);
-    assert_eq!(after(Observation::NotSearched, 99), Vec::<&str>::new(), "it was not missed");
+    for (observation, frames, expected) in [
+        (Observation::Missed, 8, vec![]),
+        (Observation::Missed, 9, vec!["track: not seen"]),
+        (Observation::OutOfView, 16, vec![]),
+        (Observation::OutOfView, 17, vec!["track: left the image"]),
+        (Observation::Occluded, 24, vec![]),
+        (Observation::Occluded, 25, vec!["track: hidden too long"]),
+        // It was not missed.
+        (Observation::NotSearched, 99, vec![]),
+    ] {
+        let (_, ends) = live(Config::default(), 5.0, &vec![observation; frames]);
+        assert_eq!(ends, expected, "{observation:?} {frames}");
+    }
 }
 
 #[test]

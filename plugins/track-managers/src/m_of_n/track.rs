@@ -84,7 +84,6 @@ impl TrackCount {
 
     /// Returns the test by which the track ends, if it does, `unseen_s` after its last support.
     pub(crate) fn end_test(&self, unseen_s: f64, settings: &Config) -> Option<&'static str> {
-        let longer_than = |limit_s: f64| unseen_s > limit_s;
         if self.observation == Observation::Started {
             return None;
         }
@@ -96,14 +95,14 @@ impl TrackCount {
         }
         let (over, test) = match self.observation {
             Observation::Occluded => {
-                (longer_than(settings.occluded_drop_after_s), "track: hidden too long")
+                (unseen_s > settings.occluded_drop_after_s, "track: hidden too long")
             }
             Observation::OutOfView => {
-                (longer_than(settings.left_drop_after_s), "track: left the image")
+                (unseen_s > settings.left_drop_after_s, "track: left the image")
             }
             Observation::Missed | Observation::NotSearched => {
                 let long = self.missed_s > settings.drop_after_s
-                    || longer_than(settings.occluded_drop_after_s);
+                    || unseen_s > settings.occluded_drop_after_s;
                 (long && self.misses >= settings.drop_after_misses, "track: not seen")
             }
             _ => (false, ""),

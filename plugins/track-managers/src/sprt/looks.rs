@@ -76,8 +76,11 @@ impl Looks {
 
     /// Adds the log-odds of a detection at a place: to the nearest look, or as a new one.
     pub(crate) fn add(&mut self, at: Point2<f64>, log_odds: f64, config: &Config) {
-        let away = |look: &Look| (look.at - at).norm().max(look.robot.coords.norm());
-        let near = self.all.iter().enumerate().map(|(index, look)| (index, away(look)));
+        let near = self
+            .all
+            .iter()
+            .enumerate()
+            .map(|(index, look)| (index, (look.at - at).norm().max(look.robot.coords.norm())));
         let near = near.filter(|(_, away_m)| *away_m < config.new_look_m);
         let nearest = near.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(index, _)| index);
         if nearest != Some(self.latest) {

@@ -129,55 +129,52 @@ fn it_speeds_up_and_slows_down_no_faster_than_it_may() {
     let config = Config { latency_s: 0.0, ..Config::default() };
     let mut controller = ArcFollow::new(config).unwrap();
     assert_eq!(controller.stand_off_m(), Some(1.4));
-    let mut speed_to = |x: f64| {
+    // It slows down by 1 m/s².
+    for (x, expected) in [(4.0, 0.05), (4.0, 0.1), (4.0, 0.15), (1.4, 0.05)] {
         let person = target(x, 0.0, Vector2::zeros());
-        speed(command(&mut controller, EgoMotion::at_rest(0.1), Some(&person)))
-    };
-    for expected in [0.05, 0.1, 0.15] {
-        assert!((speed_to(4.0) - expected).abs() < 1e-9);
+        let wheels = command(&mut controller, EgoMotion::at_rest(0.1), Some(&person));
+        assert!((speed(wheels) - expected).abs() < 1e-9, "{x}: {wheels:?}");
     }
-    assert!((speed_to(1.4) - 0.05).abs() < 1e-9, "1 m/s²");
 }
 
 /// The arc of path A, and on the spot the more the slower it drives, 20 degrees to the side.
 #[test]
 fn the_turn_is_that_of_the_arc_and_of_the_bearing() {
     let bearing = 20_f64.to_radians();
-    let of = |range_m: f64| {
+    let [wheels, near] = [2.0, 0.25].map(|range_m| {
         let config = Config { path: Path::A, latency_s: 0.0, ..Config::default() };
         settled(config, &target(range_m * bearing.cos(), range_m * bearing.sin(), Vector2::zeros()))
-    };
-    let wheels = of(2.0);
+    });
     let driven = 0.8 * 0.6 * bearing.cos().powi(2);
     assert!((speed(wheels) - driven).abs() < 1e-9, "{wheels:?}");
     let turned = driven * bearing.sin() + (1.0 - driven / MAX_MPS) * bearing;
     assert!((turn_rate(wheels) - turned).abs() < 1e-9, "{wheels:?}");
     // At half the least range, half the rate.
-    assert!((turn_rate(of(0.25)) - 0.5 * bearing).abs() < 1e-9);
+    assert!((turn_rate(near) - 0.5 * bearing).abs() < 1e-9);
 }
 
 #[test]
 fn it_goes_on_turning_the_way_it_began() {
     let mut controller = ArcFollow::new(Config::default()).unwrap();
-    let mut rate = |y: f64| {
+    for y in [0.3, -0.3, 0.1] {
         let person = target(-2.0, y, Vector2::zeros());
-        turn_rate(command(&mut controller, EgoMotion::at_rest(0.1), Some(&person)))
-    };
-    assert!(rate(0.3) > 0.0);
-    assert!(rate(-0.3) > 0.0 && rate(0.1) > 0.0, "hesitates");
+        let wheels = command(&mut controller, EgoMotion::at_rest(0.1), Some(&person));
+        assert!(turn_rate(wheels) > 0.0, "hesitates at {y}");
+    }
 }
 
 #[test]
 fn turning_in_place_ends_later_than_it_begins() {
     let mut controller = ArcFollow::new(Config { latency_s: 0.0, ..Config::default() }).unwrap();
-    let mut driven = |degrees: f64| {
+    for (degrees, drives) in
+        [(55.0_f64, true), (65.0, false), (35.0, false), (25.0, true), (55.0, true)]
+    {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let person = target(3.0 * cos, 3.0 * sin, Vector2::zeros());
         let steps = (0..20)
             .map(|_| speed(command(&mut controller, EgoMotion::at_rest(0.1), Some(&person))));
-        steps.last().unwrap() > 0.0
-    };
-    assert_eq!([55.0, 65.0, 35.0, 25.0, 55.0].map(&mut driven), [true, false, false, true, true]);
+        assert_eq!(steps.last().unwrap() > 0.0, drives, "{degrees}");
+    }
 }
 
 #[test]
@@ -240,17 +237,18 @@ fn somebody_unseen_is_followed_ever_more_slowly_and_then_no_more() {
 
 #[test]
 fn a_robot_that_answers_late_does_the_same_later() {
-    let drive = |latency_s, delay: usize| {
+    let [late, at_once] = [(0.3, 6), (0.0, 0)].map(|(latency_s, delay)| {
         let config = Config { latency_s, ..Config::default() };
         let mut drive = Drive::new(config, 0.05, delay);
         let velocity = Vector2::new(0.4, 0.3);
-        let commands = (0..120).map(|i| {
+        let mut commands = Vec::new();
+        for i in 0..120 {
             let when_it_answers = 0.05 * (i + 6 - delay) as f64;
-            drive.step(Point2::new(1.0, 2.0) + velocity * when_it_answers, velocity)
-        });
-        commands.collect::<Vec<_>>()
-    };
-    for (late, at_once) in drive(0.3, 6).iter().zip(drive(0.0, 0)) {
+            commands.push(drive.step(Point2::new(1.0, 2.0) + velocity * when_it_answers, velocity));
+        }
+        commands
+    });
+    for (late, at_once) in late.iter().zip(at_once) {
         assert!((late.left - at_once.left).abs() < 1e-9, "{late:?} {at_once:?}");
         assert!((late.right - at_once.right).abs() < 1e-9, "{late:?} {at_once:?}");
     }

@@ -135,12 +135,10 @@ proptest! {
         // Left and right of straight behind there are two ways to turn.
         prop_assume!(x > 0.0 || y.abs() > 1e-3);
         let velocity = Vector2::new(vx, vy);
-        let first = |x, y| {
+        let [here, there] = [(x, y), (x + 1e-7, y - 1e-7)].map(|(x, y)| {
             let mut controller = ArcFollow::new(config.clone()).unwrap();
             command(&mut controller, EgoMotion::at_rest(0.1), Some(&target(x, y, velocity)))
-        };
-        let here = first(x, y);
-        let there = first(x + 1e-7, y - 1e-7);
+        });
         // Where turning on the spot begins, the wanted speed jumps, and the acceleration limits the
         // result.
         let near = (y.atan2(x).abs().to_degrees() - 60.0).abs() < 1e-3;

@@ -32,10 +32,11 @@ fn run(filter: &Ekf, turn_radps: f64) -> Outcome {
         let mut world = World::new(seed);
         let seen = world.look();
         let mut state = filter.start(&seen);
-        let drive = |world: &mut World| world.drive(SPEED_MPS, turn_radps);
-        track(filter, &mut state, &mut world, 22, drive);
+        track(filter, &mut state, &mut world, 22, |world| world.drive(SPEED_MPS, turn_radps));
         for _ in 0..20 {
-            nis.extend(track(filter, &mut state, &mut world, 1, drive));
+            nis.extend(track(filter, &mut state, &mut world, 1, |world| {
+                world.drive(SPEED_MPS, turn_radps)
+            }));
             let off = state.mean.fixed_rows::<3>(0) - world.person_in_robot().coords;
             velocities.push(state.mean[3]);
             positions.push(off[0]);
@@ -110,7 +111,7 @@ fn the_filter_is_consistent() {
 #[test]
 fn errors_of_the_odometry_are_accounted_for() {
     let sigma = Vector3::new(0.01, 0.01, 0.03);
-    let nis = |told: bool| {
+    let [told, untold] = [true, false].map(|told| {
         let filter = corrected();
         let mut all = Vec::new();
         for seed in 200..200 + SEEDS {
@@ -131,7 +132,7 @@ fn errors_of_the_odometry_are_accounted_for() {
             }));
         }
         mean(&all)
-    };
-    assert!(nis(true) < 3.3, "{}", nis(true));
-    assert!(nis(false) > 4.0, "{}", nis(false));
+    });
+    assert!(told < 3.3, "{told}");
+    assert!(untold > 4.0, "{untold}");
 }

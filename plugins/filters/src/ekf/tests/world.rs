@@ -15,11 +15,10 @@ pub const SIGMA_M: f64 = 0.05;
 pub fn normal3(random: &mut SplitMix64) -> Vector3<f64> {
     // From numbers in [0, 1) and not those of `RandomSource::normal`: the bounds of these tests
     // were set with this sequence.
-    let mut normal = || {
+    Vector3::from([(); 3].map(|()| {
         let radius = (-2.0 * (1.0 - random.uniform()).ln()).sqrt();
         radius * (std::f64::consts::TAU * random.uniform()).cos()
-    };
-    Vector3::new(normal(), normal(), normal())
+    }))
 }
 
 pub fn camera() -> Camera {

@@ -192,18 +192,21 @@ fn a_look_from_before_a_pause_stays_faded_beside_the_next_one_elsewhere() {
 #[test]
 fn misses_count_until_the_track_is_supported_again() {
     let mut bench = Bench::new(looks_only(), 3.0, 3.0);
-    let mut after = |observation| {
+    for (observation, expected) in [
+        (Observation::Missed, 2.5),
+        (Observation::Missed, 2.0),
+        (Observation::NotSearched, 2.0),
+        (Observation::Occluded, 3.0),
+    ] {
         bench.observe(0.1, observation);
-        bench.track.score
-    };
-    assert_near(after(Observation::Missed), 2.5);
-    assert_near(after(Observation::Missed), 2.0);
-    assert_near(after(Observation::NotSearched), 2.0);
-    assert_near(after(Observation::Occluded), 3.0);
-    after(Observation::Missed);
+        assert_near(bench.track.score, expected);
+    }
+    bench.observe(0.1, Observation::Missed);
     // The filter alone supports it: 1 per second.
-    assert_near(after(Observation::Updated), 2.9);
-    assert_near(after(Observation::Updated), 2.8);
+    for expected in [2.9, 2.8] {
+        bench.observe(0.1, Observation::Updated);
+        assert_near(bench.track.score, expected);
+    }
     assert_near(bench.look(0.1, 3.0, 3.0), 3.3);
 }
 
@@ -368,16 +371,21 @@ fn tracks_that_are_not_confirmed_end_by_misses_by_time_or_by_evidence() {
 fn candidates_are_dropped_by_the_test_that_speaks_against_them() {
     let mut manager = Sprt::new(Config { start_log_odds: 0.5, ..looks_only() }).unwrap();
     assert_eq!(manager.start_log_odds(), 0.5);
-    let mut offer = |score: f64, detector_log_odds: f64, discovered: bool| {
+    for (score, detector_log_odds, discovered, expected) in [
+        (0.4, 0.4, true, Some("score")),
+        (0.4, 0.5, true, Some("verifier")),
+        (0.4, 0.6, true, Some("verifier")),
+        (0.6, 0.6, false, Some("no track fits")),
+        (0.5, 0.5, true, None),
+    ] {
         let seen = detection(3.0, score);
         let new = Unassociated::new(&seen, detector_log_odds, discovered);
-        manager.initiate(ID, &new)
-    };
-    assert_eq!(offer(0.4, 0.4, true), Initiation::Drop("score"));
-    assert_eq!(offer(0.4, 0.5, true), Initiation::Drop("verifier"));
-    assert_eq!(offer(0.4, 0.6, true), Initiation::Drop("verifier"));
-    assert_eq!(offer(0.6, 0.6, false), Initiation::Drop("no track fits"));
-    assert!(matches!(offer(0.5, 0.5, true), Initiation::Start(_)));
+        let initiation = manager.initiate(ID, &new);
+        match expected {
+            Some(test) => assert_eq!(initiation, Initiation::Drop(test)),
+            None => assert!(matches!(initiation, Initiation::Start(_))),
+        }
+    }
 }
 
 /// The search near a lost track found somebody whom no track takes.
