@@ -157,7 +157,8 @@ mod tests {
 
     #[test]
     fn a_network_that_cannot_be_made_is_an_error() {
-        let cases: [(fn() -> Result<Sleeper, String>, &str); 3] = [
+        type Load = fn() -> Result<Sleeper, String>;
+        let cases: [(Load, &str); 3] = [
             (|| Err("no, never".into()), "no, never"),
             (|| panic!("while loading"), "the runtime failed"),
             (
