@@ -9,9 +9,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use tagalong_benches::square::{camera, frame, track};
 use tagalong_compressive::{Compressive, Config};
 use tagalong_config::Registry;
-use tagalong_core::{
-    Detector, EgoMotion, ExternalDetection, Frame, Funnel, Images, Query, Stamp, Track,
-};
+use tagalong_core::{Detector, EgoMotion, ExternalDetection, Frame, Funnel, Images, Query, Stamp};
 use tagalong_correlation::Correlation;
 use tagalong_geometry::Rect;
 use tagalong_pipeline::Pipeline;

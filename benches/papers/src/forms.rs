@@ -1,7 +1,7 @@
 //! The first table of a published system: the figures of its paper, the method as printed, the
 //! method with its errors corrected, and ours, side by side; real rooms first.
 
-use tagalong_eval::{Scores, Similarity, Tally};
+use tagalong_eval::{Similarity, Tally};
 use tagalong_report::{Cell, Row, Table};
 use tagalong_sim::Scene;
 use tagalong_trials::{Contender, Judge, Trial, TrialError};

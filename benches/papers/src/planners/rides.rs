@@ -163,7 +163,7 @@ pub(super) fn drive(lab: &Lab, what: &str, jobs: &[Job]) -> Result<Vec<Driven>, 
 }
 
 /// Drives one ride.
-fn drive_one(lab: &Lab, job: &Job) -> Result<Driven, ReproduceError> {
+fn drive_one(lab: &Lab, job: &Job) -> Result<Driven, TrialError> {
     let ride = job.ride(lab)?;
     let Job { setting, planner, .. } = *job;
     // People of these scenes react, so that there are measures of every ride.
