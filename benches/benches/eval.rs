@@ -21,12 +21,15 @@ use tagalong_eval::{
 const NAMES: [&str; 4] = ["MOT17-02-FRCNN", "MOT17-04-FRCNN", "MOT17-05-FRCNN", "MOT17-10-FRCNN"];
 
 fn sequence(mot: &Path, name: &str) -> Sequence {
-    let text = |path: &str| read_to_string(mot.join(path)).expect("a file of the data set");
-    let folder = format!("gt/MOT17-train/{name}");
-    let info = mot::parse_info(&text(&format!("{folder}/seqinfo.ini")), "seqinfo.ini");
-    let truth = mot::parse_truth(&text(&format!("{folder}/gt/gt.txt")), "gt", mot::Rules::Mot17);
-    let tracks =
-        mot::parse_tracks(&text(&format!("tracker-output/MOT17-train/{name}.txt")), "tracks");
+    let [info, truth, tracks] = [
+        format!("gt/MOT17-train/{name}/seqinfo.ini"),
+        format!("gt/MOT17-train/{name}/gt/gt.txt"),
+        format!("tracker-output/MOT17-train/{name}.txt"),
+    ]
+    .map(|path| read_to_string(mot.join(path)).expect("a file of the data set"));
+    let info = mot::parse_info(&info, "seqinfo.ini");
+    let truth = mot::parse_truth(&truth, "gt", mot::Rules::Mot17);
+    let tracks = mot::parse_tracks(&tracks, "tracks");
     let mut timeline = Timeline::new();
     let rules = mot::Rules::Mot17;
     timeline.add_truths(truth.expect("truth").iter().map(|row| row.truth(rules)));
@@ -46,18 +49,25 @@ fn families(sequence: &Sequence) -> f64 {
 
 fn scoring(c: &mut Criterion) {
     let Some(mot) = tagalong_conformance::testdata::find("mot") else { return };
-    let read = || -> Vec<Sequence> { NAMES.iter().map(|name| sequence(&mot, name)).collect() };
-    let sequences = read();
-    c.bench_function("MOT17 train: read", |b| b.iter(read));
+    let sequences = all_sequences(&mot);
+    c.bench_function("MOT17 train: read", |b| b.iter(|| all_sequences(&mot)));
     c.bench_function("MOT17 train: CLEAR, Identity, HOTA", |b| {
         b.iter(|| sequences.iter().map(families).sum::<f64>());
     });
     c.bench_function("MOT17 train: everything", |b| {
         let comparison = Comparison::default();
-        let tally =
-            |s| Tally::measure(s, &comparison, &SetDistance::default()).expect("sane boxes");
-        b.iter(|| Tally::combine(sequences.iter().map(tally).collect::<Vec<_>>().iter()).scores());
+        let distance = SetDistance::default();
+        b.iter(|| {
+            let tallies = sequences.iter().map(|s| Tally::measure(s, &comparison, &distance));
+            let tallies: Result<Vec<Tally>, _> = tallies.collect();
+            Tally::combine(&tallies.expect("sane boxes")).scores()
+        });
     });
+}
+
+/// Reads all sequences with their tracks.
+fn all_sequences(mot: &Path) -> Vec<Sequence> {
+    NAMES.iter().map(|name| sequence(mot, name)).collect()
 }
 
 criterion_group! {

@@ -21,16 +21,15 @@ fn weighing(c: &mut Criterion) {
         let people = scenes(count, held);
         let mut out = Vec::new();
         let mut index = 0;
-        let mut setup = || {
-            index += 1;
-            let frame = frame(index, &depth, &camera);
-            // The reduced image is shared with the detector; it is not weighing.
-            weigher.log_likelihood(&frame, &[]).expect("a frame with depth");
-            frame
-        };
         c.bench_function(name, |b| {
             b.iter_batched(
-                &mut setup,
+                || {
+                    index += 1;
+                    let frame = frame(index, &depth, &camera);
+                    // The reduced image is shared with the detector; it is not weighing.
+                    weigher.log_likelihood(&frame, &[]).expect("a frame with depth");
+                    frame
+                },
                 |frame| {
                     let people = black_box(&people);
                     weigher.log_likelihoods(&frame, people, 2, &mut out).expect("depth");

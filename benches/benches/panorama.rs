@@ -66,31 +66,43 @@ fn detecting(c: &mut Criterion) {
         height: panorama.rows,
         robot_from_camera: world.camera().robot_from_camera,
     });
-    let mut unwrapping = Unwrapping::default();
-    let mut frame = |index: u64, raw: &Images| {
-        let images = unwrapping.apply(&panorama, raw).expect("the mirror is right");
-        let stamp = Stamp::from_nanos(index * 333_000_000);
-        Frame::new(index, stamp, Arc::clone(&camera), EgoMotion::at_rest(0.333), images)
-    };
     let config = Config { background_frames: 12, ..Config::default() };
-    let mut eyes = Eyes::new(config).expect("the settings are right");
-    let mut see = |frame: &Frame| {
-        let blobs = eyes.look(frame, &mut Funnel::default());
-        eyes.adapt(frame, &[]).and(blobs).expect("the frame is in colour").len()
+    let mut sight = Sight {
+        camera,
+        unwrapping: Unwrapping::default(),
+        eyes: Eyes::new(config).expect("the settings are right"),
+        index: 0,
     };
     let shots: Vec<Shot> = std::iter::from_fn(|| next(&mut world)).take(40).collect();
-    let mut index = 0;
     for shot in &shots {
-        index += 1;
-        see(&frame(index, &shot.images));
+        sight.people_in(&shot.images);
     }
     let last = &shots.last().expect("the scene is long enough").images;
     c.bench_function("unwrap colour and find people, 480x120", |b| {
-        b.iter(|| {
-            index += 1;
-            see(&frame(index, black_box(last)))
-        });
+        b.iter(|| sight.people_in(black_box(last)));
     });
+}
+
+/// What finds people in circular images.
+struct Sight {
+    camera: Arc<Camera>,
+    unwrapping: Unwrapping,
+    eyes: Eyes,
+    index: u64,
+}
+
+impl Sight {
+    /// Unwraps an image, and counts the people in it.
+    fn people_in(&mut self, raw: &Images) -> usize {
+        self.index += 1;
+        let panorama = self.camera.panorama().expect("the camera is a panorama");
+        let images = self.unwrapping.apply(panorama, raw).expect("the mirror is right");
+        let stamp = Stamp::from_nanos(self.index * 333_000_000);
+        let camera = Arc::clone(&self.camera);
+        let frame = Frame::new(self.index, stamp, camera, EgoMotion::at_rest(0.333), images);
+        let blobs = self.eyes.look(&frame, &mut Funnel::default());
+        self.eyes.adapt(&frame, &[]).and(blobs).expect("the frame is in colour").len()
+    }
 }
 
 criterion_group! {

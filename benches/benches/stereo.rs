@@ -167,13 +167,13 @@ impl Bench {
     /// The median of each stage over some frames, by the clock on the wall.
     fn shares(&mut self) -> String {
         let reports: Vec<FrameReport> = (0..101).map(|_| self.step()).collect();
-        let median = |stage: usize| {
+        let mut medians = Vec::new();
+        for (stage, (name, _)) in reports[0].timings.iter().enumerate() {
             let mut ms: Vec<f64> = reports.iter().map(|r| r.timings[stage].1).collect();
             ms.sort_by(f64::total_cmp);
-            format!("{} {:.2}", reports[0].timings[stage].0, ms[ms.len() / 2])
-        };
-        let stages: Vec<String> = (0..reports[0].timings.len()).map(median).collect();
-        stages.join(", ")
+            medians.push(format!("{name} {:.2}", ms[ms.len() / 2]));
+        }
+        medians.join(", ")
     }
 }
 

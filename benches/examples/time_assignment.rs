@@ -24,16 +24,10 @@ fn main() {
 fn time(size: usize) -> (f64, f64) {
     let costs: Vec<f64> = (0..size * size).map(|i| mixed(i as u64)).collect();
     let miss = vec![MISS; size];
-    let solve = || assign(size, &miss, |row, col| Some(costs[row * size + col]));
-    let us = median_us(solve);
-    (
-        us,
-        solve()
-            .iter()
-            .enumerate()
-            .map(|(row, col)| col.map_or(MISS, |col| costs[row * size + col]))
-            .sum(),
-    )
+    let us = median_us(|| assign(size, &miss, |row, col| Some(costs[row * size + col])));
+    let assigned = assign(size, &miss, |row, col| Some(costs[row * size + col]));
+    let paid = assigned.iter().enumerate();
+    (us, paid.map(|(row, col)| col.map_or(MISS, |col| costs[row * size + col])).sum())
 }
 
 /// Returns a number in 0 to 1 that looks random.

@@ -23,21 +23,23 @@ fn main() -> Result<(), std::num::ParseIntError> {
     let sampler = Sampler { grow: 0.0, scaling: Scaling::Unit };
     let model = Model::new(sampler, GAMMA, 0.0, support.iter().zip(weights));
     let patches = patches_from(vectors, patches);
-    let all = || patches.iter().map(|patch| model.decision(patch)).sum::<f64>();
-    println!("{:.3} {:.6}", median_us(all) / patches.len() as f64, all());
+    let us = median_us(|| patches.iter().map(|patch| model.decision(patch)).sum::<f64>());
+    let sum: f64 = patches.iter().map(|patch| model.decision(patch)).sum();
+    println!("{:.3} {sum:.6}", us / patches.len() as f64);
     Ok(())
 }
 
 /// Returns patches of length 1, the first of them with the given number.
 fn patches_from(first: usize, count: usize) -> Vec<Patch> {
-    let patch = |k: usize| {
+    let mut patches = Vec::with_capacity(count);
+    for k in first..first + count {
         let mut patch: Patch = std::array::from_fn(|i| {
             let number = number_at(1, (k * PIXELS + i) as u64);
             (number >> 11) as f32 / (1_u64 << 53) as f32 - 0.5
         });
         let length = patch.iter().map(|v| v * v).sum::<f32>().sqrt();
         patch.iter_mut().for_each(|v| *v /= length);
-        patch
-    };
-    (first..first + count).map(patch).collect()
+        patches.push(patch);
+    }
+    patches
 }

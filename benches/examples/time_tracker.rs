@@ -53,11 +53,13 @@ impl Detector for Grid {
 
     fn detect(&mut self, frame: &Frame, _: &Query<'_>, _: &mut Funnel) -> Result<Vec<Detection>> {
         let side = (self.people as f64).sqrt().ceil() as usize;
-        let mut off = || self.random.between(-0.05, 0.05);
         let found = (0..self.people).map(|i| {
             let row = (i / side) as f64;
             let column = (i % side) as f64 - 0.5 * (side - 1) as f64;
-            let position = Point3::new(2.0 + 1.1 * row + off(), 1.1 * column + off(), 1.6 + off());
+            let position = Point3::from(
+                [2.0 + 1.1 * row, 1.1 * column, 1.6]
+                    .map(|at| at + self.random.between(-0.05, 0.05)),
+            );
             Detection::new("grid", position, Matrix3::identity() * 0.0025, 4.0)
                 .with_image(ImageBox::upper_body(frame.camera.upper_body(&position)))
         });

@@ -43,16 +43,15 @@ fn noise(i: usize) -> f64 {
 
 /// Returns scenes of two people around the truth; depth and height vary unless they are held.
 pub fn scenes(count: usize, held: bool) -> Vec<Person> {
-    let vary = |i: usize, part: f64| if held { 0.0 } else { part * noise(i) };
-    let person = |i: usize| {
-        let head = HEADS[i % 2];
-        let aside = 0.2 * noise(3 * i);
-        let position = Point3::new(
-            head.x + vary(3 * i + 1, 0.1),
-            head.y + aside,
-            head.z + vary(3 * i + 2, 0.04),
-        );
-        Person { position, velocity: Vector2::zeros() }
-    };
-    (0..2 * count).map(person).collect()
+    let mut people = Vec::with_capacity(2 * count);
+    for i in 0..2 * count {
+        let mut position = HEADS[i % 2];
+        position.y += 0.2 * noise(3 * i);
+        if !held {
+            position.x += 0.1 * noise(3 * i + 1);
+            position.z += 0.04 * noise(3 * i + 2);
+        }
+        people.push(Person { position, velocity: Vector2::zeros() });
+    }
+    people
 }

@@ -17,16 +17,21 @@ pub fn camera() -> Arc<Camera> {
 
 /// Returns a patterned square before a patterned wall at 6 m, and its depth, m.
 pub fn frame(camera: &Arc<Camera>, of: Rect, index: u64, face_m: f32) -> Frame {
-    let inside = |x: usize, y: usize| of.contains(nalgebra::Point2::new(x as f64, y as f64));
     let grey = GreyImage::from_fn(640, 480, |x, y| {
-        let (x, y, kind) = if inside(x, y) { (2 * x, y, 90) } else { (x, 3 * y, 20) };
+        let (x, y, kind) = if is_inside(&of, x, y) { (2 * x, y, 90) } else { (x, 3 * y, 20) };
         ((x * x / 64 + y * 7) % 120 + kind) as u8
     });
-    let depth = DepthImage::from_fn(640, 480, |x, y| if inside(x, y) { face_m } else { 6.0 });
+    let depth =
+        DepthImage::from_fn(640, 480, |x, y| if is_inside(&of, x, y) { face_m } else { 6.0 });
     let images =
         Images { grey: Some(Arc::new(grey)), depth: Some(Arc::new(depth)), ..Images::default() };
     let stamp = Stamp::default().plus_seconds(index as f64 * 0.04);
     Frame::new(index, stamp, Arc::clone(camera), EgoMotion::at_rest(0.04), images)
+}
+
+/// Says whether a pixel lies in a box.
+fn is_inside(of: &Rect, x: usize, y: usize) -> bool {
+    of.contains(nalgebra::Point2::new(x as f64, y as f64))
 }
 
 /// Returns the colour image of the patterned square before the patterned wall, without depth.

@@ -157,13 +157,12 @@ fn json(all: &[ExperimentFindings]) -> Result<String, Failure> {
 }
 
 fn write(folder: &Path, all: &[ExperimentFindings]) -> Result<(), Failure> {
-    let save = |name: &str, text: &str| write_file(&folder.join(name), text);
     let tables = all.iter().flat_map(|found| &found.findings.tables);
     let pages: Vec<String> = tables.map(Table::markdown).collect();
-    save("tables.json", &json(all)?)?;
-    save("tables.md", &pages.join("\n"))?;
+    write_file(&folder.join("tables.json"), &json(all)?)?;
+    write_file(&folder.join("tables.md"), &pages.join("\n"))?;
     for picture in all.iter().flat_map(|found| &found.findings.pictures) {
-        save(&format!("{}.svg", picture.name), &picture.svg)?;
+        write_file(&folder.join(format!("{}.svg", picture.name)), &picture.svg)?;
     }
     say(&format!("the tables and pictures are in {}", folder.display()));
     Ok(())
@@ -248,9 +247,13 @@ mod tests {
         let findings = Findings { tables: vec![table], pictures: vec![picture] };
         let found = ExperimentFindings { experiment: "one", simulated: Vec::new(), findings };
         write(folder.path(), &[found]).unwrap();
-        let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
-        assert!(read("tables.md").contains("**A table**"));
-        assert!(read("tables.json").contains("\"experiment\": \"one\""));
-        assert_eq!(read("plot.svg"), "<svg/>");
+        for (name, part) in [
+            ("tables.md", "**A table**"),
+            ("tables.json", "\"experiment\": \"one\""),
+            ("plot.svg", "<svg/>"),
+        ] {
+            let text = std::fs::read_to_string(folder.path().join(name)).unwrap();
+            assert!(text.contains(part), "{name}: {text}");
+        }
     }
 }

@@ -67,13 +67,20 @@ pub(crate) fn p_values(rival: &[Vec<f64>], draws: &[Vec<f64>]) -> [Cell; 2] {
 
 /// Returns a score of the tallies of all draws together, with its interval over draws.
 pub(crate) fn pooled(draws: &[&Tally], digits: usize, score: fn(&Scores) -> Option<f64>) -> Cell {
-    let figure = |drawn: &[usize]| {
-        score(&Tally::combine(drawn.iter().map(|draw| draws[*draw])).scores()).unwrap_or(f64::NAN)
-    };
-    match draws_interval(draws.len(), figure) {
+    let interval =
+        draws_interval(draws.len(), |drawn| score_of(drawn.iter().map(|draw| draws[*draw]), score));
+    match interval {
         Some(interval) => Cell::estimate(Some(interval), digits),
-        None => Cell::number(figure(&(0..draws.len()).collect::<Vec<_>>()), digits),
+        None => Cell::number(score_of(draws.iter().copied(), score), digits),
     }
+}
+
+/// Returns a score of tallies taken together; NaN if they have none.
+fn score_of<'a>(
+    tallies: impl Iterator<Item = &'a Tally>,
+    score: fn(&Scores) -> Option<f64>,
+) -> f64 {
+    score(&Tally::combine(tallies).scores()).unwrap_or(f64::NAN)
 }
 
 #[cfg(test)]

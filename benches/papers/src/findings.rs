@@ -133,13 +133,10 @@ mod tests {
         let registry = tagalong_config::Registry::default();
         let mut lab = lab(&registry, false, None);
         let experiment = Experiment { name: "draws", about: "", run: drawing };
-        let mut find = |first_seed| {
+        let [here, again, there] = [30, 30, 31].map(|first_seed| {
             lab.first_seed = first_seed;
             experiment.find(&lab).unwrap()
-        };
-        let here = find(30);
-        let again = find(30);
-        let there = find(31);
+        });
         assert_eq!(here, again);
         assert_ne!(here.findings.tables[0].rows, there.findings.tables[0].rows);
         let note = "Simulated for this table. turntable: 2 seeds of the split test from 30 on.";

@@ -400,28 +400,23 @@ impl Trials {
     }
 
     fn row(&self, at: usize) -> Vec<Cell> {
-        fn all(_: &&Result) -> bool {
-            true
-        }
-
-        fn good(result: &&Result) -> bool {
-            result.in_image
-        }
-
         fn share_of(all: usize, count: usize) -> Cell {
             Cell::share(count as u64, all as u64, 1)
         }
 
+        fn mean_cell<'a>(values: impl Iterator<Item = &'a f64>, digits: usize) -> Cell {
+            Cell::number(mean(&values.copied().collect::<Vec<f64>>()), digits)
+        }
+
         let trials = self.of(at).filter(|r| r.is_trial).count();
         let across = self.of(at).filter(|r| r.in_image).count();
-        let mean = |values: Vec<f64>, digits| Cell::number(mean(&values), digits);
         vec![
             Cell::number(self.cost(at, 0), 0),
             Cell::number(self.cost(at, 1), 2),
             Cell::number(self.cost(at, 2), 2),
-            mean(self.of(at).filter(good).flat_map(|r| r.pixels.clone()).collect(), 2),
-            mean(self.of(at).filter(all).flat_map(|r| r.pixels.clone()).collect(), 2),
-            mean(self.of(at).filter(all).flat_map(|r| r.metres.clone()).collect(), 3),
+            mean_cell(self.of(at).filter(|r| r.in_image).flat_map(|r| &r.pixels), 2),
+            mean_cell(self.of(at).flat_map(|r| &r.pixels), 2),
+            mean_cell(self.of(at).flat_map(|r| &r.metres), 3),
             share_of(trials, across),
             share_of(trials, self.of(at).filter(|r| r.is_trial && r.across_seen).count()),
             share_of(trials, self.of(at).filter(|r| r.is_trial && r.floor_seen).count()),
@@ -436,15 +431,14 @@ impl Trials {
     }
 
     fn chart(&self) -> String {
-        let error =
-            |at| mean(&self.of(at).flat_map(|r| r.metres.iter().copied()).collect::<Vec<_>>());
         let points = self
             .contenders
             .iter()
             .enumerate()
             .map(|(at, contender)| {
                 let name = contender.name.trim_start_matches("joint-particle-").to_owned();
-                (name, self.cost(at, 1), error(at))
+                let errors: Vec<f64> = self.of(at).flat_map(|r| r.metres.iter().copied()).collect();
+                (name, self.cost(at, 1), mean(&errors))
             })
             .collect();
         Scatter {
@@ -488,15 +482,15 @@ fn result(trial: &Trial, run: &Run) -> Result {
     // A person needs a track by the first overlap, because P3 starts from tracks.
     let rules = Crossing { settle_s: first_overlap_s(trial), ..Crossing::default() };
     let across = crossing(trial, run, &Crossing { across_only: true, ..rules });
-    let while_seen = |across_only| {
+    let [across_seen, floor_seen] = [true, false].map(|across_only| {
         let rules = Crossing { across_only, min_visible: SEEN, ..rules };
         crossing(trial, run, &rules).is_ok()
-    };
+    });
     let mut result = Result {
         is_trial: !matches!(across, Err(Failing::NotFound { .. } | Failing::Nobody)),
         in_image: across.is_ok(),
-        across_seen: while_seen(true),
-        floor_seen: while_seen(false),
+        across_seen,
+        floor_seen,
         ..Result::default()
     };
     for (moment, report) in trial.moments.iter().zip(&run.reports) {
@@ -519,10 +513,12 @@ fn first_overlap_s(trial: &Trial) -> f64 {
 }
 
 fn estimate(truth: &Truth, tracks: &[Track]) -> Option<Point3<f64>> {
-    let away = |place: &Point3<f64>| (place - truth.head_in_robot).xy().norm();
     let places = tracks.iter().filter(|t| t.confirmed).map(|t| t.estimate.person.position);
+    let nearest = places
+        .map(|place| ((place - truth.head_in_robot).xy().norm(), place))
+        .min_by(|a, b| a.0.total_cmp(&b.0));
     // A track farther away belongs to another person, and its error says nothing.
-    places.filter(|p| away(p) < FAR_M).min_by(|a, b| away(a).total_cmp(&away(b)))
+    nearest.filter(|(away_m, _)| *away_m < FAR_M).map(|(_, place)| place)
 }
 
 fn pixels_apart(camera: &Camera, a: &Point3<f64>, b: &Point3<f64>) -> Option<f64> {

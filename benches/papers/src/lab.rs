@@ -225,10 +225,13 @@ impl Lab<'_> {
         keep: impl Fn(Trial) -> Result<T, TrialError> + Sync,
     ) -> Result<Vec<T>, ReproduceError> {
         self.progress.begin(scenes.len(), what);
-        let trial = |scene: &Scene| {
-            Trial::of_pairs(scene, contenders, self.registry, stereo).and_then(&keep)
-        };
-        Ok(in_order(scenes, self.jobs, trial, |_| self.progress.step())?)
+        let trials = in_order(
+            scenes,
+            self.jobs,
+            |scene| Trial::of_pairs(scene, contenders, self.registry, stereo).and_then(&keep),
+            |_| self.progress.step(),
+        );
+        Ok(trials?)
     }
 }
 

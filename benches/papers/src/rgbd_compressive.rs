@@ -171,16 +171,19 @@ impl Work {
             BOXES.iter().chain([&COMPARED]).any(|test| r.funnel.count(test) > 0)
         }
 
-        let count = |test: &str| reports.iter().map(|r| r.funnel.count(test)).sum::<u64>();
-        let by_depth: u64 = BY_DEPTH.map(count).iter().sum();
-        let looked_at = count(BY_GRADIENTS);
-        let compared = count(COMPARED);
+        fn count(reports: &[FrameReport], tests: &[&str]) -> u64 {
+            reports.iter().map(|r| tests.iter().map(|test| r.funnel.count(test)).sum::<u64>()).sum()
+        }
+
+        let by_depth = count(reports, &BY_DEPTH);
+        let looked_at = count(reports, &[BY_GRADIENTS]);
+        let compared = count(reports, &[COMPARED]);
         Self {
             frames: reports.len() as u64,
             ms,
             // Each window either fails a test of depth or reaches the gradients.
             windows: [by_depth + looked_at, looked_at],
-            boxes: [compared + BOXES.map(count).iter().sum::<u64>(), compared],
+            boxes: [compared + count(reports, &BOXES), compared],
             searched: reports.iter().filter(is_searched).count() as u64,
         }
     }
@@ -198,13 +201,14 @@ impl Work {
     /// Returns frames per second; windows and boxes per frame, and how many of each remain after
     /// the depth tests.
     fn cells(&self) -> [Cell; 5] {
-        let a_frame = |count: u64| match count {
-            0 => Cell::default(),
-            _ => Cell::number(count as f64 / self.frames as f64, 0),
-        };
         let hz = Cell::number(1e3 * self.frames as f64 / self.ms, 0);
         let ([windows, looked_at], [boxes, compared]) = (self.windows, self.boxes);
-        [hz, a_frame(windows), a_frame(looked_at), a_frame(boxes), a_frame(compared)]
+        let [windows, looked_at, boxes, compared] =
+            [windows, looked_at, boxes, compared].map(|count| match count {
+                0 => Cell::default(),
+                _ => Cell::number(count as f64 / self.frames as f64, 0),
+            });
+        [hz, windows, looked_at, boxes, compared]
     }
 }
 
@@ -373,12 +377,11 @@ fn boxes(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
             let run = tolerance * searches.len() + at;
             let work = Work::sum(trials.iter().map(|runs| runs[run].work));
             let Work { boxes: [all, left], searched, .. } = work;
-            let a_search = |count: u64| Cell::number(count as f64 / searched as f64, 0);
             // The number of all boxes does not depend on the tolerance.
             if tolerance == 0 {
-                cells.push(a_search(all));
+                cells.push(Cell::number(all as f64 / searched as f64, 0));
             }
-            cells.push(a_search(left));
+            cells.push(Cell::number(left as f64 / searched as f64, 0));
             cells.push(Cell::number(100.0 * left as f64 / all as f64, 1));
         }
         let how = if *each_pixel { "pixel by pixel" } else { "on the coarse grid" };

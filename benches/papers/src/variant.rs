@@ -35,9 +35,12 @@ pub(crate) fn with_values(
 ) -> Result<Contender, ReproduceError> {
     let mut config = Value::Table(parsed(contender)?);
     for (key, text) in values {
-        let fails = |why: &str| ReproduceError::Other(format!("{name}: {key} = {text}: {why}"));
-        let value = text.parse().map_err(|error: toml::de::Error| fails(error.message()))?;
-        *slot(&mut config, key).ok_or_else(|| fails("there is no such place"))? = value;
+        let value = text.parse().map_err(|error: toml::de::Error| error.message().to_owned());
+        let set = value.and_then(|value| {
+            *slot(&mut config, key).ok_or("there is no such place")? = value;
+            Ok(())
+        });
+        set.map_err(|why| ReproduceError::Other(format!("{name}: {key} = {text}: {why}")))?;
     }
     let config = toml::to_string(&config).map_err(|error| ReproduceError::of(name, error))?;
     Ok(Contender { name: name.to_owned(), config, ..contender.clone() })
@@ -72,12 +75,12 @@ mod tests {
     #[test]
     fn mistakes_are_named() {
         let contender = Contender::new("old", "[filter]\nplugin = \"b\"\n");
-        let fails =
-            |key, text| with_values(&contender, "new", &[(key, text)]).unwrap_err().to_string();
-        assert!(
-            fails("filter.plugin.size", "1")
-                .contains("filter.plugin.size = 1: there is no such place")
-        );
-        assert!(fails("filter.size", "1 2").contains("filter.size = 1 2"));
+        for (key, text, told) in [
+            ("filter.plugin.size", "1", "filter.plugin.size = 1: there is no such place"),
+            ("filter.size", "1 2", "filter.size = 1 2"),
+        ] {
+            let error = with_values(&contender, "new", &[(key, text)]).unwrap_err().to_string();
+            assert!(error.contains(told), "{error}");
+        }
     }
 }

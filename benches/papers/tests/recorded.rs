@@ -49,13 +49,11 @@ fn with_the_detections_of_sort_it_is_at_least_as_accurate_as_sort() {
     let ours: Vec<_> = table.rows.iter().filter(|row| !row.published).collect();
     // Eleven sequences, and two sums.
     assert_eq!(ours.len(), 11 + 2);
-    let mota = |name: &str| {
+    for name in ["all eleven", "these six"] {
         let row = ours.iter().find(|row| row.name.ends_with(name)).unwrap();
-        row.cells[0].value.unwrap()
-    };
-    let all = mota("all eleven");
-    let six = mota("these six");
-    assert!(all >= SORT_MOTA && six >= SORT_MOTA, "{all} {six}");
+        let mota = row.cells[0].value.unwrap();
+        assert!(mota >= SORT_MOTA, "{name}: {mota}");
+    }
 }
 
 /// P4 says about 1 % at 3 m. With the radius of a head behind the measured surface the centre is too
@@ -65,12 +63,11 @@ fn a_stereo_pair_sees_the_centre_of_a_head_where_it_is_to_one_per_cent() {
     let table = table(["stereo-svm-ekf", "depth"], None, Some(5));
     println!("{}", table.text());
     // At 2 and at 3 m; from 4 m on five turns tell too little.
-    let near = |name: &str| {
+    let rows = ["stereo-ekf, error, % of the range", "with the radius of a head, mm"];
+    let [bias, by_radius] = rows.map(|name| {
         let row = table.rows.iter().find(|row| row.name == name).unwrap();
         [1, 2].map(|distance| row.cells[distance].value.unwrap())
-    };
-    let bias = near("stereo-ekf, error, % of the range");
+    });
     assert!(bias.iter().all(|percent| percent.abs() < 1.0), "{bias:?}");
-    let by_radius = near("with the radius of a head, mm");
     assert!(by_radius.iter().all(|mm| *mm > 20.0), "{by_radius:?}");
 }

@@ -60,9 +60,9 @@ fn heads(frames: &[TruthFrame]) -> Vec<(u64, [f64; 3])> {
 #[test]
 fn webcams_make_the_truth_of_a_log() {
     let folder = tempfile::tempdir().unwrap();
-    let path = |name: &str| folder.path().join(name);
-    fs::write(path("hat.toml"), format!("{ROOM}{}", webcams(0.0, 0.0))).unwrap();
-    fs::write(path("guess.toml"), webcams(0.2, 4.0)).unwrap();
+    let path = folder.path();
+    fs::write(path.join("hat.toml"), format!("{ROOM}{}", webcams(0.0, 0.0))).unwrap();
+    fs::write(path.join("guess.toml"), webcams(0.2, 4.0)).unwrap();
     run(folder.path(), &["simulate", "hat.toml", "-o", "hat.mcap"]);
     let found = run(
         folder.path(),
@@ -80,15 +80,16 @@ fn webcams_make_the_truth_of_a_log() {
         ],
     );
     let found: serde_json::Value = serde_json::from_str(&found).unwrap();
-    let number = |key: &str| found[key]["mean_cm"].as_f64().unwrap();
-    assert!(number("as_guessed") > 10.0, "{found}");
-    assert!(number("calibrated") < 3.0 && number("held_out") < 3.0, "{found}");
+    let [guessed, calibrated, held_out] =
+        ["as_guessed", "calibrated", "held_out"].map(|key| found[key]["mean_cm"].as_f64().unwrap());
+    assert!(guessed > 10.0, "{found}");
+    assert!(calibrated < 3.0 && held_out < 3.0, "{found}");
     assert_eq!(found["cameras"].as_array().map(Vec::len), Some(4));
-    let rows = fs::read_to_string(path("hat.csv")).unwrap().lines().count() - 1;
+    let rows = fs::read_to_string(path.join("hat.csv")).unwrap().lines().count() - 1;
     assert_eq!(found["measured"].as_u64(), Some(rows as u64));
 
-    let measured = read_truth_lines(&path("hat.truth.jsonl")).unwrap();
-    let drawn = read_truth(&path("hat.mcap"), &Limits::default()).unwrap().unwrap();
+    let measured = read_truth_lines(&path.join("hat.truth.jsonl")).unwrap();
+    let drawn = read_truth(&path.join("hat.mcap"), &Limits::default()).unwrap().unwrap();
     let measured = heads(&measured);
     let drawn = heads(&drawn);
     assert!(2 * measured.len() > drawn.len(), "{} of {}", measured.len(), drawn.len());
@@ -112,14 +113,14 @@ fn webcams_make_the_truth_of_a_log() {
             "said.jsonl",
         ],
     );
-    let said = heads(&read_truth_lines(&path("said.jsonl")).unwrap());
+    let said = heads(&read_truth_lines(&path.join("said.jsonl")).unwrap());
     assert_eq!(said.len(), measured.len());
     for ((_, a), (_, b)) in said.iter().zip(&measured) {
         assert!((a[0] - b[0]).hypot(a[1] - b[1]) < 1e-3, "{a:?} {b:?}");
     }
 
     fs::write(
-        path("c.toml"),
+        path.join("c.toml"),
         "[[detectors]]\nplugin = \"omni-appearance\"\nconfig = { distance = \"analytic\" }\n[filter]\nplugin = \"ekf\"\n",
     )
     .unwrap();
@@ -162,19 +163,22 @@ fn a_robot_of_which_nobody_says_where_it_stands_is_asked_for() {
 #[test]
 fn commands_of_the_product_know_the_printed_plugins_and_its_own_ones_tell_their_failures() {
     let folder = tempfile::tempdir().unwrap();
-    let run = |words: &[&str]| papers().args(words).current_dir(folder.path()).output().unwrap();
-    let listed = run(&["list"]);
+    fs::write(folder.path().join("broken.mcap"), "no log").unwrap();
+    fs::write(folder.path().join("c.toml"), webcams(0.0, 0.0)).unwrap();
+    let [listed, unknown, broken] = [
+        vec!["list"],
+        vec!["reproduce", "stereo-smv-ekf", "--format", "json"],
+        vec!["triangulate", "broken.mcap", "--cameras", "c.toml"],
+    ]
+    .map(|words| papers().args(words).current_dir(folder.path()).output().unwrap());
     assert_eq!(code(&listed), 0);
     for plugin in ["ekf", "ekf-as-printed", "arc-follow-as-printed"] {
         assert!(text(&listed.stdout).contains(&format!("{plugin} ")), "{plugin}");
     }
-    let unknown = run(&["reproduce", "stereo-smv-ekf", "--format", "json"]);
     let told = text(&unknown.stderr);
     let last = told.lines().next_back().unwrap_or_default();
     let error: serde_json::Value = serde_json::from_str(last).unwrap();
     assert!(error["error"].as_str().unwrap().contains("stereo-svm-ekf"), "{told}");
     assert_eq!((code(&unknown), error["exit_code"].as_i64()), (2, Some(2)));
-    fs::write(folder.path().join("broken.mcap"), "no log").unwrap();
-    fs::write(folder.path().join("c.toml"), webcams(0.0, 0.0)).unwrap();
-    assert_eq!(code(&run(&["triangulate", "broken.mcap", "--cameras", "c.toml"])), 1);
+    assert_eq!(code(&broken), 1);
 }

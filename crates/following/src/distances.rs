@@ -41,14 +41,15 @@ impl SafetyDistances {
         let stopping_m = command_limiter.stopping_m(speed_mps) - command_limiter.margin_m;
         let least_s = command_limiter.reaction_s + command_limiter.settle_s;
         let stopping_s = least_s + speed_mps / command_limiter.max_decel_mps2;
-        let comes = |time_s| reach_m(collision_monitor, collision_monitor.people_mps, time_s);
+        let [comes_m, least_comes_m] = [stopping_s, least_s]
+            .map(|time_s| reach_m(collision_monitor, collision_monitor.people_mps, time_s));
         let protective_m = collision_monitor.protective_m;
         Self {
             speed_mps,
             stopping_m,
             before_things_m: stopping_m + collision_monitor.stop_m,
-            separation_m: comes(stopping_s) + stopping_m + protective_m,
-            least_separation_m: comes(least_s) + protective_m,
+            separation_m: comes_m + stopping_m + protective_m,
+            least_separation_m: least_comes_m + protective_m,
             followed_m: collision_monitor.followed_stop_m,
             turning_radius_m: Footprint::new(&robot.footprint).radius_m(),
             stop_polygon_m: foremost_m(&collision_monitor.stop),
@@ -84,8 +85,9 @@ impl BlindZone {
         let meets_m = (down.z < 0.0).then(|| eye.x - down.x * eye.z / down.z);
         let front_m = Footprint::new(&settings.robot.footprint).front_m();
         let height = 0.5 * (camera.height as f64 - 1.0);
-        let side = |x: f64| camera.back_project(Point2::new(x, height), 1.0).coords - eye;
-        let field_of_view = side(0.0).angle(&side(camera.width as f64 - 1.0));
+        let [left, right] = [0.0, camera.width as f64 - 1.0]
+            .map(|x| camera.back_project(Point2::new(x, height), 1.0).coords - eye);
+        let field_of_view = left.angle(&right);
         Self {
             floor_m: meets_m.map(|at_m| (at_m - front_m).max(0.0)),
             field_of_view_deg: field_of_view.to_degrees(),

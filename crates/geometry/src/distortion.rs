@@ -67,19 +67,17 @@ impl Distortion {
     /// Inverts by Newton's method, with shorter steps where a whole one leads away: wide lenses
     /// bend so much that fixed-point iteration runs off.
     fn search(&self, goal: Vector2<f64>) -> (f64, f64) {
-        let bent = |at: &Vector2<f64>| Vector2::from(<[f64; 2]>::from(self.apply(at.x, at.y)));
         let mut at = goal;
-        let mut error = goal - bent(&at);
+        let mut error = goal - self.bent_point(&at);
         for _ in 0..MAX_STEPS {
             if error.norm() < CLOSE {
                 break;
             }
-            let Some(step) = slope(bent, &at).try_inverse().map(|inverse| inverse * error) else {
-                break;
-            };
+            let slope = slope(|at| self.bent_point(at), &at);
+            let Some(step) = slope.try_inverse().map(|inverse| inverse * error) else { break };
             let lengths = (0..12).map(|halvings| 0.5_f64.powi(halvings));
             let better = lengths.map(|length| at + step * length).find_map(|next| {
-                let left = goal - bent(&next);
+                let left = goal - self.bent_point(&next);
                 (left.norm() < error.norm()).then_some((next, left))
             });
             let Some(better) = better else { break };
@@ -87,14 +85,19 @@ impl Distortion {
         }
         (at.x, at.y)
     }
+
+    /// Returns the distorted place of a point.
+    fn bent_point(&self, at: &Vector2<f64>) -> Vector2<f64> {
+        Vector2::from(<[f64; 2]>::from(self.apply(at.x, at.y)))
+    }
 }
 
 /// Returns the derivative of a mapping, by differences.
 fn slope(bent: impl Fn(&Vector2<f64>) -> Vector2<f64>, at: &Vector2<f64>) -> Matrix2<f64> {
     let step = 1e-6;
-    let along =
-        |axis: Vector2<f64>| (bent(&(at + axis * step)) - bent(&(at - axis * step))) / (2.0 * step);
-    Matrix2::from_columns(&[along(Vector2::x()), along(Vector2::y())])
+    let columns = [Vector2::x(), Vector2::y()]
+        .map(|axis| (bent(&(at + axis * step)) - bent(&(at - axis * step))) / (2.0 * step));
+    Matrix2::from_columns(&columns)
 }
 
 /// Applies the radial and tangential distortion of the rational model: k1 to k6, and p1, p2.

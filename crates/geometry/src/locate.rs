@@ -112,9 +112,9 @@ impl Camera {
             return None;
         }
         let eye = self.robot_from_camera.translation.vector;
-        let ray = |row: f64| self.robot_from_camera.rotation * self.ray(Point2::new(column, row));
-        let to_feet = ray(lowest);
-        let to_top = ray(whole_body.y);
+        let rotation = self.robot_from_camera.rotation;
+        let to_feet = rotation * self.ray(Point2::new(column, lowest));
+        let to_top = rotation * self.ray(Point2::new(column, whole_body.y));
         let away_m = (to_feet.z < 0.0).then(|| eye.z / -to_feet.z * to_feet.xy().norm())?;
         // The head is above the feet, so its ray is followed as far along the floor.
         let top = eye + to_top * (away_m / to_top.xy().norm());
@@ -185,13 +185,15 @@ mod tests {
     #[test]
     fn a_box_that_cannot_stand_on_the_floor_has_no_head() {
         let camera = camera();
-        let none = |x: f64, y: f64, width: f64, height: f64| {
-            camera.head_above_floor(&Rect::new(x, y, width, height)).is_none()
-        };
-        assert!(none(300.0, 100.0, 80.0, 379.5), "cut off below");
-        assert!(none(300.0, 10.0, 80.0, 100.0), "above the horizon");
-        assert!(none(300.0, 300.0, 20.0, 30.0), "no person is so small");
-        assert!(none(300.0, 0.0, 80.0, 310.0), "no person is so tall");
+        for (y, width, height, why) in [
+            (100.0, 80.0, 379.5, "cut off below"),
+            (10.0, 80.0, 100.0, "above the horizon"),
+            (300.0, 20.0, 30.0, "no person is so small"),
+            (0.0, 80.0, 310.0, "no person is so tall"),
+        ] {
+            let whole_body = Rect::new(300.0, y, width, height);
+            assert_eq!(camera.head_above_floor(&whole_body), None, "{why}");
+        }
     }
 
     proptest! {

@@ -217,14 +217,14 @@ impl Panorama {
         let (bearing, _) = self.mirror.direction(head);
         // Rays start on the ring of viewpoints, not on the axis, hence `range + ring`.
         let (ring, height) = self.mirror.ring_m();
-        let row = |z: f64| self.row((z - height).atan2(range + ring));
         let top = head.z + HEAD_BELOW_TOP_M;
         let bottom = head.z + HEAD_BELOW_TOP_M - UPPER_BODY_SIDE_M;
+        let [top, bottom] = [top, bottom].map(|z| self.row((z - height).atan2(range + ring)));
         let half_angle = (0.5 * UPPER_BODY_SIDE_M / range).atan();
         let width = 2.0 * half_angle / TAU * self.columns as f64;
         // A region starts within the image, and continues across the seam.
         let left = (self.column(bearing) - 0.5 * width).rem_euclid(self.columns as f64);
-        Rect::new(left, row(top), width, row(bottom) - row(top))
+        Rect::new(left, top, width, bottom - top)
     }
 }
 
@@ -258,16 +258,21 @@ mod tests {
     #[test]
     fn front_is_the_middle_left_is_left_and_the_seam_is_behind() {
         let panorama = panorama();
+        assert!((pixel_of(&panorama, [2.0, 0.0, 1.0]).x - 239.5).abs() < 1e-9);
+        assert!((pixel_of(&panorama, [0.0, 2.0, 1.0]).x - 119.5).abs() < 1e-9);
+        assert!(pixel_of(&panorama, [-2.0, 0.01, 1.0]).x < 1.0);
+        assert!(pixel_of(&panorama, [-2.0, -0.01, 1.0]).x > 478.0);
         let mount = ConicalMirror::upright(1.5).inverse();
-        let column = |x: f64, y: f64| panorama.pixel(&(mount * Point3::new(x, y, 1.0))).x;
-        assert!((column(2.0, 0.0) - 239.5).abs() < 1e-9);
-        assert!((column(0.0, 2.0) - 119.5).abs() < 1e-9);
-        assert!(column(-2.0, 0.01) < 1.0 && column(-2.0, -0.01) > 478.0);
-        let raw = |x: f64, y: f64| {
-            let (bearing, elevation) = panorama.mirror.direction(&(mount * Point3::new(x, y, 1.0)));
+        let [front, left] = [[2.0, 0.0, 1.0], [0.0, 2.0, 1.0]].map(|point| {
+            let (bearing, elevation) = panorama.mirror.direction(&(mount * Point3::from(point)));
             panorama.mirror.raw_pixel(bearing, elevation) - panorama.mirror.centre_px
-        };
-        assert!(raw(2.0, 0.0).y < -20.0 && raw(0.0, 2.0).x > 20.0);
+        });
+        assert!(front.y < -20.0 && left.x > 20.0);
+    }
+
+    /// Returns the pixel of a point on the robot.
+    fn pixel_of(panorama: &Panorama, point: [f64; 3]) -> Point2<f64> {
+        panorama.pixel(&(ConicalMirror::upright(1.5).inverse() * Point3::from(point)))
     }
 
     #[test]
@@ -377,11 +382,9 @@ mod tests {
         let width = 2.0 * (0.285_f64 / 2.0).atan() / TAU * 480.0;
         assert!((square.width - width).abs() < 1e-9, "{square:?}");
         assert!((square.centre().x - 239.5).abs() < 1e-9, "{square:?}");
-        let row = |z: f64| {
-            let mount = ConicalMirror::upright(1.5).inverse();
-            panorama.pixel(&(mount * Point3::new(2.0, 0.0, z))).y
-        };
-        assert!((square.y - row(1.74)).abs() < 1e-9, "{square:?}");
-        assert!((square.bottom() - row(1.17)).abs() < 1e-9, "{square:?}");
+        let top = pixel_of(&panorama, [2.0, 0.0, 1.74]).y;
+        let bottom = pixel_of(&panorama, [2.0, 0.0, 1.17]).y;
+        assert!((square.y - top).abs() < 1e-9, "{square:?}");
+        assert!((square.bottom() - bottom).abs() < 1e-9, "{square:?}");
     }
 }

@@ -25,16 +25,16 @@ impl Adam {
         decay: f32,
     ) {
         self.steps += 1;
-        let slopes = || gradient.iter().flat_map(|part| part.iter());
-        let length = slopes().map(|g| g * g).sum::<f32>().sqrt();
+        let slopes = gradient.iter().copied().flatten();
+        let length = slopes.clone().map(|g| g * g).sum::<f32>().sqrt();
         let scale = LONGEST / length.max(LONGEST);
         let whole = FADE.map(|fade| 1.0 - fade.powi(self.steps));
-        let count = slopes().count();
+        let count = slopes.clone().count();
         self.mean.resize(count, 0.0);
         self.squares.resize(count, 0.0);
         let moments = self.mean.iter_mut().zip(&mut self.squares);
         let weights = weights.into_iter().flatten();
-        for ((value, slope), (mean, square)) in weights.zip(slopes()).zip(moments) {
+        for ((value, slope), (mean, square)) in weights.zip(slopes).zip(moments) {
             let slope = slope * scale;
             *mean = FADE[0] * *mean + (1.0 - FADE[0]) * slope;
             *square = FADE[1] * *square + (1.0 - FADE[1]) * slope * slope;

@@ -97,8 +97,8 @@ impl<'a> Boosting<'a> {
             .chain(std::iter::repeat(-1.0))
             .take(table.samples)
             .collect();
-        let of = |class: f32| truth.iter().filter(|t| **t == class).count().max(1) as f32;
-        let counts = [of(-1.0), of(1.0)];
+        let counts = [-1.0, 1.0]
+            .map(|class: f32| truth.iter().filter(|t| **t == class).count().max(1) as f32);
         let weights = truth.iter().map(|t| 0.5 / counts[usize::from(*t > 0.0)]).collect();
         Self { table, weights, sums: vec![0.0; truth.len()], truth }
     }
@@ -158,12 +158,10 @@ impl Growing<'_> {
         let below = table.threshold(feature, level);
         self.tree.push(Question { feature, below, next: [Next::Leaf(0.0); 2] });
         let row = table.row(feature);
-        let parts = |of: &[u32]| -> [Vec<u32>; 2] {
+        let [chosen, all] = [chosen, all].map(|of| -> [Vec<u32>; 2] {
             let (left, right) = of.iter().partition(|i| usize::from(row[**i as usize]) <= level);
             [left, right]
-        };
-        let chosen = parts(chosen);
-        let all = parts(all);
+        });
         for side in 0..2 {
             let [weight, sum] = self.weight(&chosen[side]);
             // A pure leaf cannot be improved by a further question.
@@ -267,11 +265,12 @@ mod tests {
         (0..2).for_each(|f| table.push(points.iter().map(|p| p[f])));
         let mut boosting = Boosting::new(&table, truth.iter().copied());
         let trees: Vec<_> = (0..40).map(|_| boosting.grow(&[0, 1], 2)).collect();
-        let sum = |p: &[f32; 2]| trees.iter().map(|tree| value(tree, p)).sum::<f32>();
-        for (point, known) in points.iter().zip(boosting.sums()) {
-            assert!((sum(point) - known).abs() < 1e-4);
+        let sums: Vec<f32> =
+            points.iter().map(|p| trees.iter().map(|tree| value(tree, p)).sum()).collect();
+        for (sum, known) in sums.iter().zip(boosting.sums()) {
+            assert!((sum - known).abs() < 1e-4);
         }
-        let right = points.iter().zip(&truth).filter(|(p, is)| (sum(p) > 0.0) == **is).count();
+        let right = sums.iter().zip(&truth).filter(|(sum, is)| (**sum > 0.0) == **is).count();
         assert!(right > 580, "{right}");
     }
 
@@ -283,21 +282,30 @@ mod tests {
         let mut table = Levels::new(numbers.len());
         table.push(numbers.iter().copied());
         let tree = Boosting::new(&table, truth.iter().copied()).grow(&[0], 1);
-        let classes = [false, true].map(|c| truth.iter().filter(|is| **is == c).count() as f64);
-        let error = |below: f32| {
-            let side = |left: bool| {
-                let all: Vec<usize> =
-                    (0..numbers.len()).filter(|i| (numbers[*i] < below) == left).collect();
-                let weight = |i: &usize| 0.5 / classes[usize::from(truth[*i])];
-                let sign = |i: &usize| if truth[*i] { 1.0 } else { -1.0 };
-                let total: f64 = all.iter().map(weight).sum();
-                let mean = all.iter().map(|i| weight(i) * sign(i)).sum::<f64>() / total.max(1e-12);
-                all.iter().map(|i| weight(i) * (sign(i) - mean).powi(2)).sum::<f64>()
-            };
-            side(true) + side(false)
-        };
-        let least = (1..256).map(|l| error(table.threshold(0, l - 1))).fold(f64::MAX, f64::min);
+        let least = (1..256)
+            .map(|level| squared_error(&numbers, &truth, table.threshold(0, level - 1)))
+            .fold(f64::MAX, f64::min);
+        let error = squared_error(&numbers, &truth, tree[0].below);
         // Samples of very little weight do not count, so it is not exactly the least.
-        assert!(error(tree[0].below) < least + 0.01, "{} {least}", error(tree[0].below));
+        assert!(error < least + 0.01, "{error} {least}");
+    }
+
+    /// Returns the weighted squared error of a cut with the mean of the classes on each side.
+    fn squared_error(numbers: &[f32], truth: &[bool], below: f32) -> f64 {
+        let classes = [false, true].map(|c| truth.iter().filter(|is| **is == c).count() as f64);
+        let mut error = 0.0;
+        for left in [true, false] {
+            let side: Vec<(f64, f64)> = numbers
+                .iter()
+                .zip(truth)
+                .filter(|(number, _)| (**number < below) == left)
+                .map(|(_, is)| (0.5 / classes[usize::from(*is)], if *is { 1.0 } else { -1.0 }))
+                .collect();
+            let total: f64 = side.iter().map(|(weight, _)| weight).sum();
+            let sum: f64 = side.iter().map(|(weight, sign)| weight * sign).sum();
+            let mean = sum / total.max(1e-12);
+            error += side.iter().map(|(weight, sign)| weight * (sign - mean).powi(2)).sum::<f64>();
+        }
+        error
     }
 }

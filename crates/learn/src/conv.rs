@@ -194,9 +194,9 @@ impl<
 
     /// Returns the columns of outputs that see no column outside of an image.
     fn full_columns(seen: usize, columns: usize) -> Range<usize> {
-        let is_full = |column: &usize| Self::taps(*column, seen) == (0..SIZE);
-        let first = (0..columns).find(is_full).unwrap_or(columns);
-        let end = (first..columns).find(|column| !is_full(column)).unwrap_or(columns);
+        let mut all = 0..columns;
+        let first = all.find(|column| Self::taps(*column, seen) == (0..SIZE)).unwrap_or(columns);
+        let end = all.find(|column| Self::taps(*column, seen) != (0..SIZE)).unwrap_or(columns);
         first..end
     }
 
@@ -355,27 +355,29 @@ mod tests {
             assert!((slope - f64::from(found)).abs() < 0.02, "{slope} {found}");
         }
 
-        let (mut conv, mut input) = (conv::<3, 4, 1, 2>(), input(5, 6));
-        let weigh = numbers(5 * 6 * 4, 0.9);
-        let loss = |conv: &Conv<3, 4, 3, 1, 2>, input: &Map<3>| -> f64 {
+        fn loss(conv: &Conv<3, 4, 3, 1, 2>, input: &Map<3>, weigh: &[f32]) -> f64 {
             let mut out = Map::<4>::new(5, 6);
             conv.linear_where(input, &[true; 30], &mut out);
-            out.values.iter().zip(&weigh).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
-        };
+            out.values.iter().zip(weigh).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
+        }
+
+        let mut conv = conv::<3, 4, 1, 2>();
+        let mut input = input(5, 6);
+        let weigh = numbers(5 * 6 * 4, 0.9);
         let of_out = Map::<4> { rows: 5, columns: 6, values: weigh.clone() };
         let mut gradient = Conv::default();
         let mut of_input = Map::new(5, 6);
         conv.backward(&input, &of_out, &mut gradient, Some(&mut of_input));
         for k in (0..conv.weights.len()).step_by(7) {
-            let before = loss(&conv, &input);
+            let before = loss(&conv, &input, &weigh);
             conv.weights[k] += 0.1;
-            close((loss(&conv, &input) - before) / 0.1, gradient.weights[k]);
+            close((loss(&conv, &input, &weigh) - before) / 0.1, gradient.weights[k]);
             conv.weights[k] -= 0.1;
         }
         for k in (0..input.values.len()).step_by(5) {
-            let before = loss(&conv, &input);
+            let before = loss(&conv, &input, &weigh);
             input.values[k] += 0.1;
-            close((loss(&conv, &input) - before) / 0.1, of_input.values[k]);
+            close((loss(&conv, &input, &weigh) - before) / 0.1, of_input.values[k]);
             input.values[k] -= 0.1;
         }
         let sum: f32 = weigh.chunks(4).map(|cell| cell[1]).sum();

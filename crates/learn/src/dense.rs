@@ -121,17 +121,19 @@ mod tests {
     fn a_fit_has_the_same_bytes_in_any_thread() {
         let rows = DMatrix::from_fn(300, 33, |row, column| number(row * 33 + column));
         let targets = DVector::from_fn(300, |row, _| number(10_000 + row));
-        let fit = || {
-            let equations = NormalEquations::new(&rows, &targets);
-            equations.solve(&[0.1; 33], equations.right_side()).unwrap()
-        };
-        let expected = fit();
+        let expected = fit_rows(&rows, &targets);
         std::thread::scope(|scope| {
-            let fits: Vec<_> = (0..4).map(|_| scope.spawn(fit)).collect();
+            let fits: Vec<_> = (0..4).map(|_| scope.spawn(|| fit_rows(&rows, &targets))).collect();
             for fitted in fits {
                 assert_eq!(fitted.join().unwrap(), expected);
             }
         });
+    }
+
+    /// Returns the weights of a fit of 33 columns.
+    fn fit_rows(rows: &DMatrix<f64>, targets: &DVector<f64>) -> DVector<f64> {
+        let equations = NormalEquations::new(rows, targets);
+        equations.solve(&[0.1; 33], equations.right_side()).expect("the equations can be solved")
     }
 
     #[test]

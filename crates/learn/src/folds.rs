@@ -21,10 +21,13 @@ pub fn parts(
         }
     }
     let without = &all - &with_people;
-    let deal = |set: &BTreeSet<(u64, u64)>| -> Vec<(u64, usize)> {
-        set.iter().enumerate().map(|(k, (_, group))| (*group, k % folds.max(1))).collect()
-    };
-    deal(&with_people).into_iter().chain(deal(&without)).collect()
+    let mut parts = BTreeMap::new();
+    for set in [&with_people, &without] {
+        for (k, (_, group)) in set.iter().enumerate() {
+            parts.insert(*group, k % folds.max(1));
+        }
+    }
+    parts
 }
 
 /// Purpose of a group of examples.
@@ -68,8 +71,8 @@ mod tests {
         let parts = parts(examples.iter().copied(), 4, 3);
         for part in 0..4 {
             for people in [true, false] {
-                let here = |e: &&Example| parts[&e.group] == part && e.is_person == people;
-                assert!(examples.iter().any(|e| here(&e)), "part {part}, people {people}");
+                let mut here = examples.iter().filter(|e| parts[&e.group] == part);
+                assert!(here.any(|e| e.is_person == people), "part {part}, people {people}");
             }
         }
     }

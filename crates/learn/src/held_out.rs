@@ -19,8 +19,9 @@ pub fn area(values: &[(f64, bool)]) -> f64 {
 
 /// Returns the fraction of a class with a positive value.
 pub fn accepted(values: &[(f64, bool)], people: bool) -> f64 {
-    let of_class = || values.iter().filter(|(_, is_person)| *is_person == people);
-    of_class().filter(|(f, _)| *f > 0.0).count() as f64 / of_class().count().max(1) as f64
+    let of_class = values.iter().filter(|(_, is_person)| *is_person == people);
+    let count = of_class.clone().count().max(1);
+    of_class.filter(|(f, _)| *f > 0.0).count() as f64 / count as f64
 }
 
 #[cfg(test)]

@@ -1,3 +1,4 @@
+use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::thread::available_parallelism;
 
@@ -25,25 +26,34 @@ fn at_once<S: Sync, T: Send>(
     things: &[S],
     work: &(impl Fn(&S) -> Result<T> + Sync),
 ) -> Result<Vec<T>> {
-    let died = |_| Err(Error::Other("the solver panicked".into()));
-    let guarded = |thing: &S| catch_unwind(AssertUnwindSafe(|| work(thing))).unwrap_or_else(died);
     // All threads are joined before the first failure counts: a thread that panics and is not
     // joined makes the scope panic.
     let results: Vec<Result<T>> = std::thread::scope(|scope| {
         let running: Vec<_> = things
             .iter()
             .map(|thing| {
-                std::thread::Builder::new().spawn_scoped(scope, move || guarded(thing)).ok()
+                let thread = std::thread::Builder::new();
+                thread.spawn_scoped(scope, move || work_guarded(thing, work)).ok()
             })
             .collect();
         let results = running.into_iter().zip(things).map(|(thread, thing)| match thread {
-            Some(thread) => thread.join().unwrap_or_else(died),
+            Some(thread) => thread.join().unwrap_or_else(error_of_panic),
             // No thread could be started for it.
-            None => guarded(thing),
+            None => work_guarded(thing, work),
         });
         results.collect()
     });
     results.into_iter().collect()
+}
+
+/// Works on one item; a panic is an error.
+fn work_guarded<S, T>(thing: &S, work: &impl Fn(&S) -> Result<T>) -> Result<T> {
+    catch_unwind(AssertUnwindSafe(|| work(thing))).unwrap_or_else(error_of_panic)
+}
+
+/// Returns the error of work that panicked.
+fn error_of_panic<T>(_: Box<dyn Any + Send>) -> Result<T> {
+    Err(Error::Other("the solver panicked".into()))
 }
 
 #[cfg(test)]

@@ -124,18 +124,20 @@ mod tests {
     #[test]
     fn broken_files_are_refused_in_a_sentence() {
         let good = text();
-        let refusal = |from: &str, to: &str| {
+        for (from, to, told) in [
+            ("test-net 1", "test-net 9", "`test-net 9`, not `test-net 1`"),
+            ("slope = 1.5", "slope = inf", "`slope`"),
+            ("offset = -0.25", "offset = \"no\"", "`offset`"),
+            ("last = [", "lost = [", "no `last`"),
+            ("[net]", "[not]", "no `first`"),
+            ("last = [\n", "last = [ 1.0,\n", "has 3 numbers and needs 2"),
+            ("first = [\n  -0.3", "first = [\n  nan", "not finite"),
+            ("first = [\n  -0.3", "first = [\n  \"a\"", "not finite"),
+        ] {
             assert!(good.contains(from), "{from}");
-            read(&good.replacen(from, to, 1)).unwrap_err()
-        };
-        assert!(refusal("test-net 1", "test-net 9").contains("`test-net 9`, not `test-net 1`"));
-        assert!(refusal("slope = 1.5", "slope = inf").contains("`slope`"));
-        assert!(refusal("offset = -0.25", "offset = \"no\"").contains("`offset`"));
-        assert!(refusal("last = [", "lost = [").contains("no `last`"));
-        assert!(refusal("[net]", "[not]").contains("no `first`"));
-        assert!(refusal("last = [\n", "last = [ 1.0,\n").contains("has 3 numbers and needs 2"));
-        assert!(refusal("first = [\n  -0.3", "first = [\n  nan").contains("not finite"));
-        assert!(refusal("first = [\n  -0.3", "first = [\n  \"a\"").contains("not finite"));
+            let refusal = read(&good.replacen(from, to, 1)).expect_err(to);
+            assert!(refusal.contains(told), "{to}: {refusal}");
+        }
         assert!(read("nonsense").is_err());
     }
 }

@@ -224,10 +224,11 @@ pub fn draws_interval(draws: usize, figure: impl Fn(&[usize]) -> f64) -> Option<
     if draws == 1 {
         return Some(Interval::open(estimate));
     }
-    let without = |out: usize| {
-        figure(&everything.iter().copied().filter(|draw| *draw != out).collect::<Vec<_>>())
-    };
-    let others: Vec<f64> = everything.iter().map(|&out| without(out)).collect();
+    let mut others = Vec::with_capacity(draws);
+    for out in 0..draws {
+        let kept: Vec<usize> = everything.iter().copied().filter(|draw| *draw != out).collect();
+        others.push(figure(&kept));
+    }
     let count = draws as f64;
     let mean = others.iter().sum::<f64>() / count;
     let square = others.iter().map(|other| (other - mean).powi(2)).sum::<f64>();

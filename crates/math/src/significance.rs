@@ -87,9 +87,8 @@ fn drawn_sum(sizes: &[f64], random: &mut SplitMix64) -> f64 {
         .chunks(u64::BITS as usize)
         .map(|sizes| {
             let signs = random.next_u64();
-            let signed =
-                |(bit, size): (usize, &f64)| if signs >> bit & 1 == 0 { *size } else { -size };
-            sizes.iter().enumerate().map(signed).sum::<f64>()
+            let sizes = sizes.iter().enumerate();
+            sizes.map(|(bit, size)| if signs >> bit & 1 == 0 { *size } else { -size }).sum::<f64>()
         })
         .sum()
 }
@@ -122,16 +121,14 @@ mod tests {
     /// All patterns, one by one.
     fn counted(differences: &[f64]) -> f64 {
         let observed = differences.iter().sum::<f64>().abs();
-        let sum = |signs: u32| -> f64 {
-            differences
-                .iter()
-                .enumerate()
-                .map(|(i, d)| if signs >> i & 1 == 0 { *d } else { -d })
-                .sum()
-        };
         let patterns = 1u32 << differences.len();
-        let beyond = (0..patterns).filter(|signs| sum(*signs).abs() >= observed - 1e-9).count();
-        beyond as f64 / f64::from(patterns)
+        let mut beyond = 0;
+        for signs in 0..patterns {
+            let all = differences.iter().enumerate();
+            let sum: f64 = all.map(|(i, d)| if signs >> i & 1 == 0 { *d } else { -d }).sum();
+            beyond += u32::from(sum.abs() >= observed - 1e-9);
+        }
+        f64::from(beyond) / f64::from(patterns)
     }
 
     proptest! {
@@ -197,12 +194,12 @@ mod tests {
     #[test]
     fn the_test_is_wrong_no_more_often_than_it_says() {
         let mut random = SplitMix64::new(11);
-        let mut rejects = |draws: usize| {
-            let differences: Vec<f64> = (0..draws).map(|_| random.normal()).collect();
-            is_significant(sign_flip(&differences).unwrap())
-        };
         for draws in [6, 9, 15] {
-            let wrong = (0..1000).filter(|_| rejects(draws)).count();
+            let mut wrong = 0;
+            for _ in 0..1000 {
+                let differences: Vec<f64> = (0..draws).map(|_| random.normal()).collect();
+                wrong += usize::from(is_significant(sign_flip(&differences).unwrap()));
+            }
             assert!((10..=65).contains(&wrong), "{wrong} of 1000 with {draws} draws");
         }
     }

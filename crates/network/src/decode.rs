@@ -74,7 +74,6 @@ pub(crate) fn decode(
     unit: Option<BoxUnit>,
     wanted: Wanted<'_>,
 ) -> Vec<ScoredBox> {
-    let named = |name: &str| outputs.iter().find(|(known, _)| *known == name).map(|(_, out)| *out);
     let first = outputs.first().map(|(_, output)| *output);
     let list = first.filter(|_| family == Family::YoloV10);
     let unit = unit.or_else(|| unit_of_list(list?, wanted.min_score));
@@ -91,17 +90,30 @@ pub(crate) fn decode(
         Family::NanoDet => first.map(|output| nanodet(output, input, wanted)),
         Family::NanoDetM => nanodet_m(outputs, input, wanted),
         Family::MoveNet => first.map(|output| movenet(output, input, wanted)),
-        Family::RtDetr => {
-            (|| Some(rt_detr(named("labels")?, named("boxes")?, named("scores")?, wanted)))()
-        }
-        Family::RfDetr => (|| Some(rf_detr(named("dets")?, named("labels")?, input, wanted)))(),
-        Family::RtmDet => (|| Some(rtmdet(named("dets")?, named("labels")?, wanted)))(),
+        Family::RtDetr => outputs_named(outputs, ["labels", "boxes", "scores"])
+            .map(|[labels, boxes, scores]| rt_detr(labels, boxes, scores, wanted)),
+        Family::RfDetr => outputs_named(outputs, ["dets", "labels"])
+            .map(|[boxes, labels]| rf_detr(boxes, labels, input, wanted)),
+        Family::RtmDet => outputs_named(outputs, ["dets", "labels"])
+            .map(|[boxes, labels]| rtmdet(boxes, labels, wanted)),
     };
     let mut found = found.unwrap_or_default();
     if family.has_unit() && unit == Some(BoxUnit::Fractions) {
         found.iter_mut().for_each(|person| scale(person, input));
     }
     found
+}
+
+/// Returns the outputs of these names, if the network has them all.
+fn outputs_named<'a, const N: usize>(
+    outputs: &[(&str, &'a Tensor)],
+    names: [&str; N],
+) -> Option<[&'a Tensor; N]> {
+    let mut found = Vec::new();
+    for name in names {
+        found.push(outputs.iter().find(|(known, _)| *known == name)?.1);
+    }
+    found.try_into().ok()
 }
 
 /// Changes a box and its joints from fractions of the input to pixels.
@@ -221,14 +233,19 @@ pub(crate) struct Columns {
 pub(crate) fn columns_of(output: &Tensor) -> Columns {
     let first = usize::from(output.shape().last() == Some(&7));
     let [before, after] = [first + 4, first + 5];
-    let is_whole = |column: usize| output.rows().all(|row| row[column].fract() == 0.0);
     // Lists with the number of the image have the class first (YOLOv7), unless it is no class.
-    let is_last = if first == 1 { is_whole(before) } else { is_whole(before) && !is_whole(after) };
+    let is_last =
+        has_whole_column(output, before) && (first == 1 || !has_whole_column(output, after));
     if is_last {
         Columns { first, score: after, label: before }
     } else {
         Columns { first, score: before, label: after }
     }
+}
+
+/// Says whether a column has whole numbers only.
+fn has_whole_column(output: &Tensor, column: usize) -> bool {
+    output.rows().all(|row| row[column].fract() == 0.0)
 }
 
 fn yolo_v10(output: &Tensor, wanted: Wanted<'_>) -> Vec<ScoredBox> {
@@ -245,11 +262,13 @@ fn nanodet(output: &Tensor, input: InputSize, wanted: Wanted<'_>) -> Vec<ScoredB
         let (scores, sides) = row.split_at(row.len() - 4 * NANODET_BINS);
         let score = wanted.best(|class| scores.get(class).copied());
         wanted.take(score, || {
-            let side = |k: usize| stride * expectation(&sides[k * NANODET_BINS..][..NANODET_BINS]);
-            let left = column * stride - side(0);
-            let top = line * stride - side(1);
-            let right = column * stride + side(2);
-            let bottom = line * stride + side(3);
+            let side: [f64; 4] = std::array::from_fn(|k| {
+                stride * expectation(&sides[k * NANODET_BINS..][..NANODET_BINS])
+            });
+            let left = column * stride - side[0];
+            let top = line * stride - side[1];
+            let right = column * stride + side[2];
+            let bottom = line * stride + side[3];
             Rect::new(left, top, right - left, bottom - top)
         })
     });
@@ -393,13 +412,13 @@ fn movenet(output: &Tensor, input: InputSize, wanted: Wanted<'_>) -> Vec<ScoredB
 
 /// Returns the box of a standing person with these joints, each as row, column and score.
 fn box_of_joints(joints: &[f32], input: InputSize) -> Rect {
-    let span = |part: usize, size: usize| {
-        let values = joints.chunks_exact(3).map(|joint| f64::from(joint[part]) * size as f64);
-        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], value| {
-            [least.min(value), most.max(value)]
-        })
-    };
-    let ([top, bottom], [left, right]) = (span(0, input.height), span(1, input.width));
+    let [[top, bottom], [left, right]] =
+        [(0, input.height), (1, input.width)].map(|(part, size)| {
+            let values = joints.chunks_exact(3).map(|joint| f64::from(joint[part]) * size as f64);
+            values.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], value| {
+                [least.min(value), most.max(value)]
+            })
+        });
     let height = bottom - top;
     let whole = height * (1.0 + ABOVE_EYES + BELOW_ANKLES);
     Rect::new(left, top - ABOVE_EYES * height, right - left, whole)
@@ -491,11 +510,13 @@ mod tests {
     fn boxes_in_fractions_of_the_input_become_pixels() {
         let row = [0.25, 0.5, 0.5, 1.0, 0.9, 0.0];
         let list = tensor(&[1, 2, 6], &[row, [0.0; 6]].concat());
-        let of = |unit: Option<BoxUnit>| {
-            rects(&decode(Family::YoloV10, &[("output", &list)], WIDE, unit, PEOPLE))
-        };
-        assert_eq!(of(None), [[16.0, 16.0, 16.0, 16.0]], "its numbers tell");
-        assert_eq!(of(Some(BoxUnit::Pixels)), [[0.25, 0.5, 0.25, 0.5]], "the setting is obeyed");
+        for (unit, rect, why) in [
+            (None, [16.0, 16.0, 16.0, 16.0], "its numbers tell"),
+            (Some(BoxUnit::Pixels), [0.25, 0.5, 0.25, 0.5], "the setting is obeyed"),
+        ] {
+            let found = decode(Family::YoloV10, &[("output", &list)], WIDE, unit, PEOPLE);
+            assert_eq!(rects(&found), [rect], "{why}");
+        }
         let one = tensor(&[1, 5, 1], &[0.5, 0.5, 0.25, 0.5, 0.9]);
         let unit = Some(BoxUnit::Fractions);
         let found = decode(Family::YoloV8, &[("output", &one)], WIDE, unit, PEOPLE);

@@ -159,8 +159,11 @@ pub(crate) fn start(
     let bytes = read(path, limits)?;
     let names = ClassNames::of(&bytes);
     let own = *limits;
-    let load = move || runtime(bytes, &own);
-    Worker::start(load, move |network| Ok(About::of(network, names, size)), limits.load_deadline)
+    Worker::start(
+        move || runtime(bytes, &own),
+        move |network| Ok(About::of(network, names, size)),
+        limits.load_deadline,
+    )
 }
 
 /// Describes the network in a file, and runs it once on a grey image.
@@ -207,18 +210,16 @@ fn input_size(port: &Port, size: OpenSize) -> Result<InputSize, String> {
     } else {
         size.usual
     };
-    let side = |fixed: Option<usize>, axis: usize| {
+    let mut sides = usual;
+    for (axis, fixed) in [width, height].into_iter().enumerate() {
         let chosen = size.chosen.map(|size| size[axis]);
-        match fixed.zip(chosen) {
-            Some((fixed, chosen)) if fixed != chosen => {
-                Err(format!("its input {port} has a fixed size: remove `size`"))
-            }
-            _ => Ok(fixed.or(chosen).unwrap_or(usual[axis])),
+        if fixed.zip(chosen).is_some_and(|(fixed, chosen)| fixed != chosen) {
+            return Err(format!("its input {port} has a fixed size: remove `size`"));
         }
-    };
-    let width = side(width, 0)?;
-    let height = side(height, 1)?;
-    if [width, height].iter().any(|side| !(1..=MAX_SIDE).contains(side)) {
+        sides[axis] = fixed.or(chosen).unwrap_or(usual[axis]);
+    }
+    let [width, height] = sides;
+    if sides.iter().any(|side| !(1..=MAX_SIDE).contains(side)) {
         return Err(format!("its input is {width} x {height} pixels; a side has 1 to {MAX_SIDE}"));
     }
     Ok(InputSize { width, height, channels_last })

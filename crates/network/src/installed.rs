@@ -20,13 +20,13 @@ pub fn networks_folder() -> Option<PathBuf> {
 
 /// Returns the folder of installed networks by the environment variables that are given.
 pub fn networks_folder_of(variable: Variables) -> Option<PathBuf> {
-    let named = |name: &str| variable(name).filter(|text| !text.is_empty()).map(PathBuf::from);
-    let data = named(DATA_FOLDER)
-        // The standard has relative paths ignored.
-        .or_else(|| {
-            Some(named("XDG_DATA_HOME").filter(|path| path.is_absolute())?.join("tagalong"))
-        })
-        .or_else(|| Some(named("HOME")?.join(".local/share/tagalong")))?;
+    let [own, shared, home] = [DATA_FOLDER, "XDG_DATA_HOME", "HOME"]
+        .map(|name| variable(name).filter(|text| !text.is_empty()).map(PathBuf::from));
+    // The standard has relative paths ignored.
+    let shared = shared.filter(|path| path.is_absolute());
+    let data = own
+        .or_else(|| Some(shared?.join("tagalong")))
+        .or_else(|| Some(home?.join(".local/share/tagalong")))?;
     Some(data.join(NETWORKS))
 }
 
@@ -70,17 +70,23 @@ mod tests {
 
     #[test]
     fn the_folder_is_that_of_the_user() {
-        let home: Variables = |name| (name == "HOME").then(|| "/users/ann".into());
-        let share = "/users/ann/.local/share/tagalong/networks";
-        assert_eq!(networks_folder_of(home), Some(share.into()));
-        let xdg: Variables = |name| (name != DATA_FOLDER).then(|| "/data".into());
-        assert_eq!(networks_folder_of(xdg), Some("/data/tagalong/networks".into()));
-        let relative: Variables = |name| (name == "XDG_DATA_HOME").then(|| "data".into());
-        assert_eq!(networks_folder_of(relative), None);
-        let own: Variables = |name| Some(if name == DATA_FOLDER { "mine" } else { "/data" }.into());
-        assert_eq!(networks_folder_of(own), Some("mine/networks".into()));
-        let empty: Variables = |name| Some(if name == "HOME" { "/users/ann" } else { "" }.into());
-        assert_eq!(networks_folder_of(empty), Some(share.into()));
+        let share = Some("/users/ann/.local/share/tagalong/networks");
+        let cases: [(Variables, Option<&str>); 5] = [
+            (|name| (name == "HOME").then(|| "/users/ann".into()), share),
+            (|name| (name != DATA_FOLDER).then(|| "/data".into()), Some("/data/tagalong/networks")),
+            // A relative folder.
+            (|name| (name == "XDG_DATA_HOME").then(|| "data".into()), None),
+            // The folder of Tagalong before all others.
+            (
+                |name| Some(if name == DATA_FOLDER { "mine" } else { "/data" }.into()),
+                Some("mine/networks"),
+            ),
+            // Empty variables.
+            (|name| Some(if name == "HOME" { "/users/ann" } else { "" }.into()), share),
+        ];
+        for (variable, folder) in cases {
+            assert_eq!(networks_folder_of(variable), folder.map(PathBuf::from));
+        }
     }
 
     #[test]

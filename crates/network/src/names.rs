@@ -77,8 +77,11 @@ impl ClassNames {
     }
 
     fn called(&self, names: &[&str]) -> Vec<usize> {
-        let is_one = |name: &str| names.contains(&name.trim().to_lowercase().as_str());
-        self.0.iter().filter(|(_, name)| is_one(name)).map(|(class, _)| *class).collect()
+        self.0
+            .iter()
+            .filter(|(_, name)| names.contains(&name.trim().to_lowercase().as_str()))
+            .map(|(class, _)| *class)
+            .collect()
     }
 
     /// Returns the first of them as a text: `0 helmet, 1 vest`.

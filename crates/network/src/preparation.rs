@@ -121,6 +121,16 @@ struct Tap {
     weight: f32,
 }
 
+impl Tap {
+    /// Returns the value of a colour between the two neighbours.
+    #[inline]
+    fn mix_pixels(&self, pixels: &[[u8; 3]], colour: usize) -> f32 {
+        let first = f32::from(pixels[self.first][colour]);
+        let second = f32::from(pixels[self.second][colour]);
+        first + (second - first) * self.weight
+    }
+}
+
 /// Returns for each of `to` pixels the neighbours among `from` pixels, with pixel centres at a
 /// half.
 fn taps(from: usize, to: usize) -> Vec<Tap> {
@@ -148,15 +158,13 @@ impl Preparation {
             Colours::Rgb => [0, 1, 2],
             Colours::Bgr => [2, 1, 0],
         };
-        let scaled =
-            |channel: usize, value: f32| (value - self.mean[channel]) / self.deviation[channel];
-        let at = |channel: usize, pixel: usize| {
-            if input.channels_last { 3 * pixel + channel } else { channel * area + pixel }
-        };
+        let [per_pixel, per_channel] = if input.channels_last { [3, 1] } else { [1, area] };
         let mut values = vec![0.0; 3 * area];
         for channel in 0..3 {
-            let padded = scaled(channel, self.padding);
-            (0..area).for_each(|pixel| values[at(channel, pixel)] = padded);
+            let padded = self.scaled(channel, self.padding);
+            for pixel in 0..area {
+                values[pixel * per_pixel + channel * per_channel] = padded;
+            }
         }
         let columns = taps(width, place.size[0]);
         let [left, top] = place.offset.map(|offset| offset as usize);
@@ -165,20 +173,22 @@ impl Preparation {
             let lower = image.row(down.second);
             let start = (top + row) * input.width + left;
             for (column, across) in columns.iter().enumerate() {
+                let pixel = (start + column) * per_pixel;
                 for (channel, &colour) in order.iter().enumerate() {
-                    let mix = |pixels: &[[u8; 3]]| {
-                        let first = f32::from(pixels[across.first][colour]);
-                        let second = f32::from(pixels[across.second][colour]);
-                        first + (second - first) * across.weight
-                    };
-                    let above = mix(upper);
-                    let below = mix(lower);
+                    let above = across.mix_pixels(upper, colour);
+                    let below = across.mix_pixels(lower, colour);
                     let value = above + (below - above) * down.weight;
-                    values[at(channel, start + column)] = scaled(channel, value);
+                    values[pixel + channel * per_channel] = self.scaled(channel, value);
                 }
             }
         }
         Some((Tensor::new(input.shape(), values)?, place))
+    }
+
+    /// Scales a value of a channel as the network was trained with.
+    #[inline]
+    fn scaled(&self, channel: usize, value: f32) -> f32 {
+        (value - self.mean[channel]) / self.deviation[channel]
     }
 }
 

@@ -34,9 +34,8 @@ impl RtenNetwork {
         let bytes = without_scalar_division(bytes);
         let model = ModelOptions::with_all_ops().load(bytes).map_err(|why| load_error(&why))?;
         check_tensors(&model, &survey, limits)?;
-        let ports = |ids: &[NodeId]| ids.iter().map(|id| port(&model, *id)).collect::<Vec<_>>();
-        let inputs = ports(model.input_ids());
-        let outputs = ports(model.output_ids());
+        let inputs = model.input_ids().iter().map(|id| port(&model, *id)).collect();
+        let outputs = model.output_ids().iter().map(|id| port(&model, *id)).collect();
         let pool = Arc::new(ThreadPool::with_num_threads(limits.threads.max(1)));
         let options = RunOptions::default().with_thread_pool(Some(pool));
         Ok(Self { model, options, inputs, outputs })

@@ -477,19 +477,21 @@ mod tests {
             Survey::of(bytes, &Limits::default())
         }
 
-        let graph = node("Relu", "x", "y");
-        let version = |content: &[u8]| [field(7, &graph), field(8, content)].concat();
-        assert!(survey(&version(&[2 << 3, 17])).is_ok());
+        /// Surveys a model with this version of the operators.
+        fn survey_version(content: &[u8]) -> Result<Survey, String> {
+            survey(&[field(7, &node("Relu", "x", "y")), field(8, content)].concat())
+        }
+
+        assert!(survey_version(&[2 << 3, 17]).is_ok());
         // A group, and a field that ends early, in the version of the operators.
-        assert!(survey(&version(&[2 << 3 | 3, 17])).unwrap_err().contains("truncated"));
-        assert!(survey(&version(&[1 << 3 | 2, 17])).is_err());
-        // A size of an input: value, type, tensor, shape, size.
-        let input = |size: &[u8]| {
-            let tensor = field(1, &field(2, &field(1, size)));
-            field(7, &[graph.clone(), field(11, &field(2, &tensor))].concat())
-        };
-        assert!(survey(&input(&[1 << 3, 64])).is_ok());
-        assert!(survey(&input(&[1 << 3 | 4, 64])).is_err());
+        assert!(survey_version(&[2 << 3 | 3, 17]).unwrap_err().contains("truncated"));
+        assert!(survey_version(&[1 << 3 | 2, 17]).is_err());
+        for (size, is_fine) in [([1 << 3, 64], true), ([1 << 3 | 4, 64], false)] {
+            // A size of an input: value, type, tensor, shape, size.
+            let tensor = field(1, &field(2, &field(1, &size)));
+            let graph = [node("Relu", "x", "y"), field(11, &field(2, &tensor))].concat();
+            assert_eq!(survey(&field(7, &graph)).is_ok(), is_fine, "{size:?}");
+        }
     }
 
     #[test]

@@ -30,7 +30,8 @@ impl Worker {
         let (jobs, queue) = sync_channel::<Vec<Tensor>>(1);
         let (done, answers) = sync_channel::<Answer>(1);
         let (ready, loaded) = sync_channel(1);
-        let work = move || {
+        let named = thread::Builder::new().name("network".into());
+        let started = named.spawn(move || {
             let mut network = match load() {
                 Ok(network) => network,
                 Err(why) => return drop(ready.send(Err(why))),
@@ -46,9 +47,8 @@ impl Worker {
                     return;
                 }
             }
-        };
-        let named = thread::Builder::new().name("network".into());
-        named.spawn(work).map_err(|why| format!("no thread for it can be started: {why}"))?;
+        });
+        started.map_err(|why| format!("no thread for it can be started: {why}"))?;
         let told = loaded.recv_timeout(deadline).map_err(|why| match why {
             RecvTimeoutError::Timeout => {
                 format!("it was not read and run once within {} s", deadline.as_secs_f64())
@@ -157,16 +157,22 @@ mod tests {
 
     #[test]
     fn a_network_that_cannot_be_made_is_an_error() {
-        let second = Duration::from_secs(1);
-        let refused = |load: fn() -> Result<Sleeper, String>| {
-            Worker::start(load, |_| Ok(()), second).map(|_| ()).unwrap_err()
-        };
-        assert_eq!(refused(|| Err("no".into())), "no");
-        assert!(refused(|| panic!("while loading")).contains("the runtime failed"));
-        let slow = refused(|| {
-            thread::sleep(Duration::from_secs(3));
-            Ok(Sleeper)
-        });
-        assert!(slow.contains("within 1 s"), "{slow}");
+        type Load = fn() -> Result<Sleeper, String>;
+        let cases: [(Load, &str); 3] = [
+            (|| Err("no, never".into()), "no, never"),
+            (|| panic!("while loading"), "the runtime failed"),
+            (
+                || {
+                    thread::sleep(Duration::from_secs(3));
+                    Ok(Sleeper)
+                },
+                "within 1 s",
+            ),
+        ];
+        for (load, told) in cases {
+            let refusal = Worker::start(load, |_| Ok(()), Duration::from_secs(1)).err();
+            let refusal = refusal.expect("it cannot be made");
+            assert!(refusal.contains(told), "{refusal}");
+        }
     }
 }

@@ -70,13 +70,11 @@ fn the_part_of_the_image_in_the_box_is_described() {
 
     for name in ["osnet.onnx", "omz.onnx"] {
         let mut network = network(name);
-        let mut vector = |x: f64, width: f64| {
+        let boxes = [(10.0, 60.0), (120.0, 60.0), (-40.0, 80.0)];
+        let [red, blue, outside] = boxes.map(|(x, width)| {
             let found = network.embed(&two_people(), &Rect::new(x, 20.0, width, 150.0)).unwrap();
             found.unwrap()
-        };
-        let red = vector(10.0, 60.0);
-        let blue = vector(120.0, 60.0);
-        let outside = vector(-40.0, 80.0);
+        });
         assert!(cosine(&red, &blue) < 0.5, "{name}");
         assert!(cosine(&red, &outside) > 0.999, "{name}: the part inside the image counts");
         assert_eq!(network.embed(&two_people(), &Rect::new(300.0, 0.0, 9.0, 9.0)), Ok(None));

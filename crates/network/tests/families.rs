@@ -105,14 +105,13 @@ fn outputs_equal_those_of_onnxruntime() {
 fn the_box_is_where_the_blob_is() {
     for (name, mut network) in all_networks() {
         let preparation = network.family().preparation();
-        let mut find =
-            |image: &RgbImage| network.find(image, &preparation, 0.5, 0.5).unwrap().unwrap();
-        let found = find(&scene(3));
+        let images = [scene(3), RgbImage::filled(64, 64, [30; 3]), RgbImage::default()];
+        let [found, plain, empty] =
+            images.map(|image| network.find(&image, &preparation, 0.5, 0.5).unwrap().unwrap());
         assert_eq!(found.len(), 1, "{name}: {found:?}");
         let overlap = found[0].rect.iou(&Rect::new(96.0, 48.0, 48.0, 96.0));
         assert!(overlap > 0.97 && found[0].score > 0.9, "{name}: {:?}", found[0]);
-        assert!(find(&RgbImage::filled(64, 64, [30; 3])).is_empty(), "{name}");
-        assert!(find(&RgbImage::default()).is_empty(), "{name}");
+        assert!(plain.is_empty() && empty.is_empty(), "{name}");
     }
 }
 
@@ -175,28 +174,31 @@ fn files_with_changed_bytes_are_survived() {
 #[test]
 fn files_beyond_the_limits_are_refused() {
     let whole = fs::read(path("yolox.onnx")).unwrap();
-    let refused = |limits: Limits| refusal(&whole, &Choices::default(), &limits);
     let usual = Limits::default();
-    let why = refused(Limits { file_bytes: 1000, ..usual });
-    assert!(why.contains("at most 1000 are read: raise `max_file_mb`"), "{why}");
-    let why = refused(Limits { operators: 3, ..usual });
-    assert!(why.contains("more than 3 operators"), "{why}");
-    let why = refused(Limits { tensor_values: 2000, ..usual });
-    assert!(why.contains("above 2000 numbers"), "{why}");
-    let why = refused(Limits { load_deadline: Duration::ZERO, ..usual });
-    assert!(why.contains("within 0 s"), "{why}");
+    for (limits, told) in [
+        (Limits { file_bytes: 1000, ..usual }, "at most 1000 are read: raise `max_file_mb`"),
+        (Limits { operators: 3, ..usual }, "more than 3 operators"),
+        (Limits { tensor_values: 2000, ..usual }, "above 2000 numbers"),
+        (Limits { load_deadline: Duration::ZERO, ..usual }, "within 0 s"),
+    ] {
+        let why = refusal(&whole, &Choices::default(), &limits);
+        assert!(why.contains(told), "{why}");
+    }
 }
 
 #[test]
 fn choices_that_do_not_fit_are_refused() {
     let whole = fs::read(path("yolox.onnx")).unwrap();
-    let refused = |choices: Choices| refusal(&whole, &choices, &Limits::default());
-    let why = refused(Choices { family: Some(Family::NanoDet), ..Choices::default() });
-    assert!(why.contains("not of the family nanodet") && why.contains("[1, 84, 7]"), "{why}");
-    let why = refused(Choices { size: Some([320, 320]), ..Choices::default() });
-    assert!(why.contains("fixed size: remove `size`"), "{why}");
-    let why = refused(Choices { classes: vec![0, 2], ..Choices::default() });
-    assert!(why.contains("2 classes from 0, and no 2"), "{why}");
+    let usual = Choices::default();
+    for (choices, told) in [
+        (Choices { family: Some(Family::NanoDet), ..usual.clone() }, "not of the family nanodet"),
+        (Choices { family: Some(Family::NanoDet), ..usual.clone() }, "[1, 84, 7]"),
+        (Choices { size: Some([320, 320]), ..usual.clone() }, "fixed size: remove `size`"),
+        (Choices { classes: vec![0, 2], ..usual }, "2 classes from 0, and no 2"),
+    ] {
+        let why = refusal(&whole, &choices, &Limits::default());
+        assert!(why.contains(told), "{why}");
+    }
 }
 
 /// Returns the file of YOLOX, of which the first of two classes is that of the blob, with these names
@@ -214,17 +216,19 @@ fn with_names(names: &str) -> Vec<u8> {
 fn people_are_the_class_that_the_file_calls_so() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("named.onnx");
-    let found = |names: &str, classes: Vec<usize>| {
+    for (names, classes, people) in [
+        ("{0: 'Person', 1: 'helmet'}", vec![], 1),
+        ("{0: 'helmet', 1: 'person'}", vec![], 0),
+        // The setting is obeyed.
+        ("{0: 'helmet', 1: 'person'}", vec![0], 1),
+        ("{0: 'helmet', 1: 'vest'}", vec![0], 1),
+    ] {
         fs::write(&file, with_names(names)).unwrap();
         let choices = Choices { classes, ..Choices::default() };
         let mut network = PersonNetwork::load(&file, &choices, &Limits::default()).unwrap();
         let found = network.find(&scene(1), &Family::Yolox.preparation(), 0.5, 0.5);
-        found.unwrap().unwrap().len()
-    };
-    assert_eq!(found("{0: 'Person', 1: 'helmet'}", vec![]), 1);
-    assert_eq!(found("{0: 'helmet', 1: 'person'}", vec![]), 0);
-    assert_eq!(found("{0: 'helmet', 1: 'person'}", vec![0]), 1, "the setting is obeyed");
-    assert_eq!(found("{0: 'helmet', 1: 'vest'}", vec![0]), 1);
+        assert_eq!(found.unwrap().unwrap().len(), people, "{names} {:?}", choices.classes);
+    }
     let why =
         refusal(&with_names("{0: 'helmet', 1: 'vest'}"), &Choices::default(), &Limits::default());
     assert!(why.contains("0 helmet, 1 vest") && why.contains("set `classes`"), "{why}");
@@ -248,32 +252,31 @@ fn the_unit_of_boxes_is_for_families_that_have_several() {
 
 #[test]
 fn lists_of_wide_people_name_the_order_of_corners() {
-    let file = path("yolov10.onnx");
-    // Four times as wide as the input: that makes a person of 16 x 32 pixels a wide one.
-    let square = scene(1);
-    let wide = RgbImage::from_fn(256, 64, |x, y| square.row(y)[x / 4]);
-    let preparation = Preparation { fit: Fit::Stretch, ..Family::YoloV10.preparation() };
-    let calls = |order: Option<BoxOrder>| {
-        let choices = Choices { order, ..Choices::default() };
-        let mut network = PersonNetwork::load(&file, &choices, &Limits::default()).unwrap();
-        let mut found = Vec::new();
-        for _ in 0..31 {
-            match network.find(&wide, &preparation, 0.1, 0.5) {
-                Ok(people) => found = people.unwrap(),
-                Err(why) => return Err(why),
-            }
-        }
-        Ok(found[0].rect)
-    };
-    let why = calls(None).unwrap_err();
+    let why = wide_person(None).unwrap_err();
     assert!(why.contains("box_order = \"yxyx\""), "{why}");
-    let as_set = calls(Some(BoxOrder::Xyxy)).unwrap();
+    let as_set = wide_person(Some(BoxOrder::Xyxy)).unwrap();
     assert!(as_set.width > 1.5 * as_set.height, "{as_set:?}");
-    let exchanged = calls(Some(BoxOrder::Yxyx)).unwrap();
+    let exchanged = wide_person(Some(BoxOrder::Yxyx)).unwrap();
     assert!((exchanged.width - 4.0 * as_set.height).abs() < 1e-3, "{exchanged:?}");
     let other = Choices { order: Some(BoxOrder::Yxyx), ..Choices::default() };
     let why = PersonNetwork::load(&path("nanodet.onnx"), &other, &Limits::default());
     assert!(why.err().unwrap().contains("remove `box_order`"));
+}
+
+/// Returns the box of a wide person after 31 calls with this order of corners.
+fn wide_person(order: Option<BoxOrder>) -> Result<Rect, String> {
+    // Four times as wide as the input: that makes a person of 16 x 32 pixels a wide one.
+    let square = scene(1);
+    let wide = RgbImage::from_fn(256, 64, |x, y| square.row(y)[x / 4]);
+    let preparation = Preparation { fit: Fit::Stretch, ..Family::YoloV10.preparation() };
+    let choices = Choices { order, ..Choices::default() };
+    let file = path("yolov10.onnx");
+    let mut network = PersonNetwork::load(&file, &choices, &Limits::default()).unwrap();
+    let mut found = Vec::new();
+    for _ in 0..31 {
+        found = network.find(&wide, &preparation, 0.1, 0.5)?.unwrap();
+    }
+    Ok(found[0].rect)
 }
 
 #[test]

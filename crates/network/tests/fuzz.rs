@@ -69,6 +69,20 @@ struct Field {
     is_bytes: bool,
 }
 
+impl Field {
+    /// Returns the message with another content of this field.
+    fn with_content(&self, message: &[u8], content: &[u8]) -> Vec<u8> {
+        let mut key = &message[self.start..self.content.start];
+        let mut length = Vec::new();
+        // The length follows the number of the field, which has one byte here.
+        if self.is_bytes {
+            key = &key[..1];
+            length = encoded(content.len() as u64);
+        }
+        [&message[..self.start], key, &length, content, &message[self.content.end..]].concat()
+    }
+}
+
 fn varint(bytes: &[u8], at: &mut usize) -> Option<u64> {
     let mut value = 0;
     for shift in (0..64).step_by(7) {
@@ -133,18 +147,7 @@ fn mutate(bytes: &[u8], other: &[u8], random: &mut Random, depth: usize) -> Vec<
         return mutate_bytes(bytes, random);
     };
     let field = &fields[random.below(fields.len())];
-    let key_end = field.content.start;
     let content = &bytes[field.content.clone()];
-    let with = |replacement: Vec<u8>| {
-        let mut key = &bytes[field.start..key_end];
-        // The length follows the number of the field, which has one byte here.
-        if field.is_bytes {
-            key = &key[..1];
-        }
-        let length = if field.is_bytes { encoded(replacement.len() as u64) } else { Vec::new() };
-        let before = &bytes[..field.start];
-        [before, key, &length, &replacement, &bytes[field.content.end..]].concat()
-    };
     match random.below(12) {
         // Drop, or repeat, the whole field.
         0 => [&bytes[..field.start], &bytes[field.content.end..]].concat(),
@@ -152,8 +155,10 @@ fn mutate(bytes: &[u8], other: &[u8], random: &mut Random, depth: usize) -> Vec<
         // A field of another file.
         2 => [&bytes[..field.start], piece(other, random), &bytes[field.start..]].concat(),
         3 => mutate_bytes(bytes, random),
-        _ if field.is_bytes => with(mutate(content, other, random, depth + 1)),
-        _ => with(encoded(EDGES[random.below(EDGES.len())])),
+        _ if field.is_bytes => {
+            field.with_content(bytes, &mutate(content, other, random, depth + 1))
+        }
+        _ => field.with_content(bytes, &encoded(EDGES[random.below(EDGES.len())])),
     }
 }
 

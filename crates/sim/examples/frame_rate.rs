@@ -93,16 +93,18 @@ fn next_shot(simulation: &mut Simulation) -> Option<Shot> {
 /// FNV-1a over all values of images and truth.
 fn digest(shots: &[Shot]) -> u64 {
     let mut digest = 0xcbf2_9ce4_8422_2325_u64;
-    let mut add = |byte: u8| digest = (digest ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
     for shot in shots {
         let images = &shot.images;
         let colour = images.colour.iter().flat_map(|image| image.pixels().as_flattened());
         let left = images.grey.iter().flat_map(|image| image.pixels());
         let right = images.right.iter().flat_map(|right| right.image.pixels());
-        colour.chain(left).chain(right).for_each(|byte| add(*byte));
         let depth = images.depth.iter().flat_map(|image| image.pixels());
-        depth.flat_map(|metres| metres.to_bits().to_le_bytes()).for_each(&mut add);
-        format!("{:?} {:?}", shot.truth, shot.laser).bytes().for_each(&mut add);
+        let text = format!("{:?} {:?}", shot.truth, shot.laser);
+        let light = colour.chain(left).chain(right).copied();
+        let depth = depth.flat_map(|metres| metres.to_bits().to_le_bytes());
+        for byte in light.chain(depth).chain(text.bytes()) {
+            digest = (digest ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+        }
     }
     digest
 }

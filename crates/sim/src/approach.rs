@@ -366,9 +366,12 @@ mod tests {
         let settings = ApproachSettings { by: ApproachBy::Trolley, ..ApproachSettings::default() };
         let mut one = Approacher::new(&settings);
         one.heading_rad = std::f64::consts::FRAC_PI_2;
-        let at = |x: f64, y: f64| one.distance_m(&Point2::new(x, y));
-        assert!((at(0.0, 1.35) - 1.0).abs() < 1e-9 && (at(1.25, 0.0) - 1.0).abs() < 1e-9);
-        assert!((at(0.25 + 0.3, 0.35 + 0.4) - 0.5).abs() < 1e-9 && at(0.0, 0.0) < -0.2);
+        for (x, y, wanted_m) in [(0.0, 1.35, 1.0), (1.25, 0.0, 1.0), (0.25 + 0.3, 0.35 + 0.4, 0.5)]
+        {
+            let away_m = one.distance_m(&Point2::new(x, y));
+            assert!((away_m - wanted_m).abs() < 1e-9, "{x} {y}: {away_m}");
+        }
+        assert!(one.distance_m(&Point2::origin()) < -0.2);
         let shapes = one.trolley(0.0).shapes;
         let top = shapes.iter().map(|s| s.origin.z + s.extent(&Vector3::z())).fold(0.0, f64::max);
         assert!((top - 1.0).abs() < 1e-9, "{top}");

@@ -190,9 +190,11 @@ impl Walker {
     /// Returns the wanted velocity or, if an object blocks the walker, one that leads round it,
     /// past the side that is nearer.
     fn round(&mut self, wanted: Vector2<f64>, dt: f64, obstacles: &[Obstacle]) -> Vector2<f64> {
-        let surface_m = |o: &Obstacle| (o.at - self.stance.place).norm() - o.radius_m;
-        let nearest = obstacles.iter().min_by(|a, b| surface_m(a).total_cmp(&surface_m(b)));
-        let thing = nearest.filter(|o| surface_m(o) < HELD_UP_M);
+        let nearest = obstacles
+            .iter()
+            .map(|o| ((o.at - self.stance.place).norm() - o.radius_m, o))
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        let thing = nearest.filter(|(surface_m, _)| *surface_m < HELD_UP_M).map(|(_, o)| o);
         let goes_round = self.held_up_s > HELD_UP_S;
         let held_up = self.velocity.dot(&wanted) < HEADWAY * wanted.norm_squared();
         let (Some(thing), true) = (thing, goes_round || held_up) else {
@@ -248,9 +250,10 @@ impl Walker {
         }
         let left = ((self.waits_until_s - now_s) / GETS_UP_S).clamp(0.0, 1.0);
         let seated = left.min(self.stance.seated);
-        let ahead_m = |seated| feet_ahead_m(&self.person.build, seated);
+        let [before_m, after_m] =
+            [self.stance.seated, seated].map(|seated| feet_ahead_m(&self.person.build, seated));
         let heading = Rotation2::new(self.stance.heading_rad) * Vector2::x();
-        self.stance.place += heading * (ahead_m(self.stance.seated) - ahead_m(seated));
+        self.stance.place += heading * (before_m - after_m);
         self.stance.seated = seated;
     }
 
@@ -266,8 +269,10 @@ impl Walker {
     /// Goes on to the next point of the path where one is within this distance, m.
     fn look_ahead(&mut self, now_s: f64, near_m: f64) {
         let path = &self.settings.path;
-        let reached = |point: &[f64; 2]| (self.stance.place - Point2::from(*point)).norm() < near_m;
-        if path.len() < 2 || !path.get(self.ahead).is_some_and(reached) {
+        let is_reached = path
+            .get(self.ahead)
+            .is_some_and(|point| (self.stance.place - Point2::from(*point)).norm() < near_m);
+        if path.len() < 2 || !is_reached {
             return;
         }
         let rest_s = self.settings.rest_s.get(self.ahead).copied().unwrap_or(0.0);
@@ -395,16 +400,22 @@ pub fn lead_of(walkers: &[Walker], i: usize) -> Option<Lead> {
 /// Returns the places that a walker avoids: those of all people in the room outside of their own
 /// group, and of members of the group that come too near.
 pub fn others(walkers: &[Walker], i: usize, now_s: f64) -> Vec<Point2<f64>> {
-    let group = |j: usize| walkers[j].beside.map_or(j, |(leader, _)| leader);
-    let place = |j: usize| walkers[j].stance.place;
-    (0..walkers.len())
-        .filter(|j| {
-            *j != i
-                && walkers[*j].is_there(now_s)
-                && (group(*j) != group(i) || (place(*j) - place(i)).norm() < TOO_NEAR_M)
-        })
-        .map(place)
-        .collect()
+    let own = walkers[i].stance.place;
+    let mut places = Vec::new();
+    for (j, other) in walkers.iter().enumerate() {
+        let place = other.stance.place;
+        let is_in_the_way =
+            leader_of(walkers, j) != leader_of(walkers, i) || (place - own).norm() < TOO_NEAR_M;
+        if j != i && other.is_there(now_s) && is_in_the_way {
+            places.push(place);
+        }
+    }
+    places
+}
+
+/// Returns the index of the walker that leads the group of a walker, or its own.
+fn leader_of(walkers: &[Walker], i: usize) -> usize {
+    walkers[i].beside.map_or(i, |(leader, _)| leader)
 }
 
 /// Returns the walker that hides each walker, seen from a place: the middle of the hidden body lies

@@ -204,11 +204,12 @@ impl Skeleton {
     fn place_arm(&mut self, side: usize, sign: f64, build: &Build, limb: &LimbAngles) {
         let h = build.height_m;
         let turn = self.world_from_thorax * about_x(sign * ARMS_OUT_RAD);
-        let down = |angle: f64| turn * Vector3::new(angle.sin(), 0.0, -angle.cos());
+        let [upper, lower] = [limb.shoulder, limb.shoulder + limb.elbow]
+            .map(|angle| turn * Vector3::new(angle.sin(), 0.0, -angle.cos()));
         let out = Vector3::new(0.0, sign * SHOULDER * h * build.breadth, 0.0);
         self.shoulders[side] = self.chest + self.world_from_thorax * out;
-        self.elbows[side] = self.shoulders[side] + down(limb.shoulder) * (UPPER_ARM * h);
-        self.wrists[side] = self.elbows[side] + down(limb.shoulder + limb.elbow) * (FOREARM * h);
+        self.elbows[side] = self.shoulders[side] + upper * (UPPER_ARM * h);
+        self.wrists[side] = self.elbows[side] + lower * (FOREARM * h);
     }
 
     /// The leg from its joint angles, its ankle moved forward by `plant_m`.
@@ -228,15 +229,14 @@ impl Skeleton {
         let below = (THIGH * limb.hip.cos() + SHANK * shank.cos()) * h;
         // The angles of the model do not know the floor exactly.
         let (knee, ankle) = leg(ahead, below.min(hip.z - ANKLE * h), h);
-        let place = |(x, down): (f64, f64)| hip + yaw * Vector3::new(x, 0.0, -down);
-        let ankle = place(ankle);
+        let [knee, ankle] = [knee, ankle].map(|(x, down)| hip + yaw * Vector3::new(x, 0.0, -down));
         // A foot near the floor lies flat on it.
         let lifted = ((ankle.z - ANKLE * h) / (0.08 * h)).clamp(0.0, 1.0);
         let pitch = lifted * (shank + limb.ankle);
         let along = yaw * Vector3::new(pitch.cos(), 0.0, pitch.sin());
         let sole = ankle - yaw * Vector3::new(0.0, 0.0, 0.018 * h);
         self.hips[side] = hip;
-        self.knees[side] = place(knee);
+        self.knees[side] = knee;
         self.ankles[side] = ankle;
         self.heels[side] = sole - along * (0.2 * FOOT * h);
         self.toes[side] = sole + along * (0.65 * FOOT * h);
@@ -346,13 +346,13 @@ mod tests {
         let build = Build { height_m: 1.70, breadth: 1.0 };
         for v in [0.5, 0.9, 1.3] {
             let cycle_s = Gait::new(1.70, v).cycle_s();
-            let ankle = |phase: f64| {
+            let mut path = Vec::new();
+            for i in 0..=20 {
+                let phase = 0.08 + 0.34 * f64::from(i) / 20.0;
                 let place = Point2::new(v * cycle_s * phase, 0.0);
                 let stance = Stance { speed_mps: v, phase, ..Stance::standing(place, 0.0) };
-                Skeleton::new(&build, &stance).ankles[0].x
-            };
-            let path: Vec<f64> =
-                (0..=20).map(|i| ankle(0.08 + 0.34 * f64::from(i) / 20.0)).collect();
+                path.push(Skeleton::new(&build, &stance).ankles[0].x);
+            }
             let spread = path.iter().copied().fold(f64::MIN, f64::max)
                 - path.iter().copied().fold(f64::MAX, f64::min);
             assert!(spread < 0.03, "{v} m/s: {spread}");

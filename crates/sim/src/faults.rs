@@ -456,9 +456,10 @@ impl Scene {
 
     /// Returns the injected faults with their times, in the order of the scene.
     pub fn scheduled_faults(&self) -> Vec<ScheduledFault> {
-        let stream = |number: usize| Random::new(self.seed, FIRST_STREAM + number as u64);
-        let faults = self.faults.inject.iter().enumerate();
-        faults.map(|(number, fault)| fault.scheduled(self, stream(number))).collect()
+        let faults = (FIRST_STREAM..).zip(&self.faults.inject);
+        faults
+            .map(|(stream, fault)| fault.scheduled(self, Random::new(self.seed, stream)))
+            .collect()
     }
 
     /// Refuses faults that cannot be injected into this scene.

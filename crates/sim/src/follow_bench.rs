@@ -196,8 +196,7 @@ impl Maker {
         for x in [0.5 * wall_m, 40.0 - 0.5 * wall_m] {
             self.add_block([x, 10.0], [wall_m, DOOR_WALL_M]);
         }
-        let mut along = || self.random.between(10.0, 31.0);
-        let target = [[along(), 5.0], [along(), 16.0]];
+        let target = [5.0, 16.0].map(|y| [self.random.between(10.0, 31.0), y]);
         self.start([40.0, 20.0], target, (0.4, 1.0));
         // Across the doorway, whatever the way along the wall is.
         let [x, y] = self.scene.people[0].path[0];
@@ -215,8 +214,7 @@ impl Maker {
         self.start([30.0, 30.0], target, (0.5, 2.0));
         let keep_free = [target[0], target[1], self.scene.robot.start];
         for _ in 0..self.bench.obstacles {
-            let mut side = || self.random.between(OBSTACLE_M[0], OBSTACLE_M[1]);
-            let size_m = [side(), side()];
+            let size_m = [0, 1].map(|_| self.random.between(OBSTACLE_M[0], OBSTACLE_M[1]));
             let reach_m = 0.5 * size_m[0].hypot(size_m[1]);
             let at = self.point_that(&[[2.5; 2], [27.5; 2]], |scene, point| {
                 let place = Point2::from(point);

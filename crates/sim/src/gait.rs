@@ -52,16 +52,19 @@ pub struct LimbAngles {
 impl LimbAngles {
     /// Returns angles a part of the way from these to others.
     pub fn mix(&self, others: &Self, part: f64) -> Self {
-        // Exact at both ends.
-        let mix = |from: f64, to: f64| from * (1.0 - part) + to * part;
         Self {
-            hip: mix(self.hip, others.hip),
-            knee: mix(self.knee, others.knee),
-            ankle: mix(self.ankle, others.ankle),
-            shoulder: mix(self.shoulder, others.shoulder),
-            elbow: mix(self.elbow, others.elbow),
+            hip: mixed_angle(self.hip, others.hip, part),
+            knee: mixed_angle(self.knee, others.knee, part),
+            ankle: mixed_angle(self.ankle, others.ankle, part),
+            shoulder: mixed_angle(self.shoulder, others.shoulder, part),
+            elbow: mixed_angle(self.elbow, others.elbow, part),
         }
     }
+}
+
+/// Returns the angle at a part of the way between two, exact at both ends.
+fn mixed_angle(from: f64, to: f64, part: f64) -> f64 {
+    from * (1.0 - part) + to * part
 }
 
 impl Gait {
@@ -193,13 +196,15 @@ mod tests {
     #[test]
     fn joints_reach_their_extremes() {
         let gait = Gait::new(1.70, 1.3);
-        let degrees = |of: fn(&LimbAngles) -> f64| {
+        let joints: [fn(&LimbAngles) -> f64; 3] =
+            [|limb| limb.hip, |limb| limb.knee, |limb| limb.elbow];
+        let [hip, knee, elbow] = joints.map(|of| {
             let (low, high) = range(|phase| of(&gait.limb(phase)).to_degrees());
             (low.round(), high.round())
-        };
-        assert_eq!(degrees(|limb| limb.hip), (-15.0, 25.0));
-        assert_eq!(degrees(|limb| limb.knee).1, 70.0);
-        assert!(degrees(|limb| limb.elbow).1 > degrees(|limb| limb.elbow).0);
+        });
+        assert_eq!(hip, (-15.0, 25.0));
+        assert_eq!(knee.1, 70.0);
+        assert!(elbow.1 > elbow.0);
     }
 
     #[test]

@@ -89,17 +89,20 @@ impl LaserSettings {
         let eye = world_from_robot * Point3::new(0.0, 0.0, self.height_m);
         let seed = tagalong_math::number_at(seed, self.rays as u64);
         let slice = world.slice(eye, &(world_from_robot.rotation * Vector3::z()));
-        let range = |(ray, direction): (u64, f64)| {
+        let mut ranges = Vec::with_capacity(self.rays);
+        for (ray, direction) in (0..).zip(self.directions()) {
             let ahead = Vector3::new(direction.cos(), direction.sin(), 0.0);
             let metres = world.distance(&slice, &(world_from_robot.rotation * ahead));
             let measured = metres + self.sigma_m * normal_at(seed, ray);
-            match () {
-                () if measured > self.max_range_m => f32::INFINITY,
-                () if measured < self.min_range_m => f32::NAN,
-                () => measured as f32,
-            }
-        };
-        (0..).zip(self.directions()).map(range).collect()
+            ranges.push(if measured > self.max_range_m {
+                f32::INFINITY
+            } else if measured < self.min_range_m {
+                f32::NAN
+            } else {
+                measured as f32
+            });
+        }
+        ranges
     }
 
     /// Returns true if two rays or more meet an object within the range, with none of the others
@@ -192,11 +195,12 @@ mod tests {
     fn noise_has_the_deviation_that_is_asked_for() {
         let world = world(&[[3.0, 0.0]]);
         let noisy = LaserSettings { sigma_m: 0.05, ..FOUR };
-        let off = |seed| {
+        let mut squares = 0.0;
+        for seed in 0..400 {
             let ranges = noisy.measure(&world, &Isometry3::identity(), seed);
-            f64::from(ranges[2]) - 2.5
-        };
-        let variance = (0..400).map(|seed| off(seed).powi(2)).sum::<f64>() / 400.0;
+            squares += (f64::from(ranges[2]) - 2.5).powi(2);
+        }
+        let variance: f64 = squares / 400.0;
         assert!((0.04..0.06).contains(&variance.sqrt()), "{variance}");
     }
 }

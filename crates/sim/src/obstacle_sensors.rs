@@ -330,7 +330,7 @@ fn are_ranges([min_m, max_m, sigma_m]: [f64; 3]) -> bool {
 
 /// Returns the directions of the rays of a cone around X.
 fn rays(opening_rad: f64) -> impl Iterator<Item = Vector3<f64>> {
-    let ring = move |ring: u32| {
+    let rings = (1..=RINGS).flat_map(move |ring| {
         let off_rad = 0.5 * opening_rad * f64::from(ring) / f64::from(RINGS);
         let count = ring * RAYS_OF_RING;
         (0..count).map(move |ray| {
@@ -338,8 +338,8 @@ fn rays(opening_rad: f64) -> impl Iterator<Item = Vector3<f64>> {
             let tilted = Vector3::new(off_rad.cos(), off_rad.sin(), 0.0);
             Rotation3::from_axis_angle(&Vector3::x_axis(), around_rad) * tilted
         })
-    };
-    std::iter::once(Vector3::x()).chain((1..=RINGS).flat_map(ring))
+    });
+    std::iter::once(Vector3::x()).chain(rings)
 }
 
 #[cfg(test)]

@@ -13,18 +13,23 @@ pub fn in_pieces<T: Send>(
     work: impl Fn(usize, &mut [T]) + Sync,
 ) {
     let pieces = Mutex::new(values.chunks_mut(length.max(1)).enumerate());
-    let labour = || {
-        while let Some((number, piece)) = next(&pieces) {
-            work(number, piece);
-        }
-    };
     thread::scope(|scope| {
         for _ in 1..threads {
             // Without another thread, those that run do its work.
-            let _ = thread::Builder::new().spawn_scoped(scope, labour);
+            let _ = thread::Builder::new().spawn_scoped(scope, || do_pieces(&pieces, &work));
         }
-        labour();
+        do_pieces(&pieces, &work);
     });
+}
+
+/// Works on pieces until none is left.
+fn do_pieces<'a, T: 'a>(
+    pieces: &Mutex<impl Iterator<Item = (usize, &'a mut [T])>>,
+    work: &impl Fn(usize, &mut [T]),
+) {
+    while let Some((number, piece)) = next(pieces) {
+        work(number, piece);
+    }
 }
 
 /// The next piece; the lock is held no longer than that.

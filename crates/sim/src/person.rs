@@ -169,16 +169,19 @@ impl Drawing<'_> {
         let pattern = Pattern::Head { half, hairline: 0.62 };
         let face = Material { second: self.look.hair, pattern, ..skin };
         self.ellipsoid(self.s.head, turn, half, face);
-        let at = |x: f64, y: f64, z: f64| self.s.head + turn * (Vector3::new(x, y, z) * h);
-        let bridge = at(0.053, 0.0, 0.008);
-        let tip = at(0.060, 0.0, -0.016);
-        let jaw = at(0.016, 0.0, -0.040);
-        let ears = [at(-0.003, 0.045, -0.004), at(-0.003, -0.045, -0.004)];
-        let crown = at(-0.008, 0.0, 0.022);
-        let back = at(-0.026, 0.0, -0.045);
+        let [bridge, tip, jaw, left_ear, right_ear, crown, back] = [
+            [0.053, 0.0, 0.008],
+            [0.060, 0.0, -0.016],
+            [0.016, 0.0, -0.040],
+            [-0.003, 0.045, -0.004],
+            [-0.003, -0.045, -0.004],
+            [-0.008, 0.0, 0.022],
+            [-0.026, 0.0, -0.045],
+        ]
+        .map(|at| self.s.head + turn * (Vector3::from(at) * h));
         self.limb(bridge, tip, 0.0045 * h, 0.0085 * h, skin);
         self.ellipsoid(jaw, turn, Vector3::new(0.036, 0.034, 0.032) * h, skin);
-        for ear in ears {
+        for ear in [left_ear, right_ear] {
             self.ellipsoid(ear, turn, Vector3::new(0.010, 0.005, 0.017) * h, skin);
         }
         self.ellipsoid(crown, turn, Vector3::new(0.052, 0.049, 0.050) * h, hair);
@@ -194,9 +197,8 @@ impl Drawing<'_> {
         let w = self.w;
         let turn = self.s.world_from_thorax;
         let top = self.look.top;
-        let down = |z: f64| self.s.chest + turn * Vector3::new(0.005 * h, 0.0, -z * h);
-        let chest = down(0.085);
-        let belly = down(0.185);
+        let [chest, belly] =
+            [0.085, 0.185].map(|z: f64| self.s.chest + turn * Vector3::new(0.005 * h, 0.0, -z * h));
         let collar = [0.07, -0.07]
             .map(|y| self.s.chest + turn * Vector3::new(-0.006 * h, y * w, -0.024 * h));
         let slope = [0.012, -0.012]
@@ -288,13 +290,12 @@ impl Drawing<'_> {
     /// The keyboard lies before the chest, the screen stands at its far edge.
     fn laptop(&mut self) {
         let turn = self.s.world_from_thorax;
-        let before = |x: f64, z: f64| self.s.chest + turn * (Vector3::new(x, 0.0, z) * self.h);
+        let [low, high] = [(0.15, -0.14), (0.225, -0.075)]
+            .map(|(x, z)| self.s.chest + turn * (Vector3::new(x, 0.0, z) * self.h));
         let shell = Material::plain([0.35; 3]);
         let glass = Material::plain([0.05; 3]);
         let keys = Form::Block(Vector3::new(0.12, 0.17, 0.01));
         let screen = Form::Block(Vector3::new(0.008, 0.17, 0.11));
-        let low = before(0.15, -0.14);
-        let high = before(0.225, -0.075);
         self.shapes.push(Shape::new(keys, low, turn, shell));
         // Glass returns hardly any projected dots.
         self.shapes.push(Shape::new(screen, high, turn, glass.with_infrared(0.03)));
@@ -312,9 +313,10 @@ impl Drawing<'_> {
         let h = self.h;
         let turn = self.s.world_from_head;
         let felt = Material::plain(colour);
-        let up = |z: f64| self.s.head + Vector3::new(0.0, 0.0, z * h);
-        self.ellipsoid(up(0.040), turn, Vector3::new(0.058, 0.052, 0.045) * h, felt);
-        self.ellipsoid(up(0.038), turn, Vector3::new(0.088, 0.078, 0.006) * h, felt);
+        for (up, half) in [(0.040, [0.058, 0.052, 0.045]), (0.038, [0.088, 0.078, 0.006])] {
+            let at = self.s.head + Vector3::new(0.0, 0.0, up * h);
+            self.ellipsoid(at, turn, Vector3::from(half) * h, felt);
+        }
     }
 
     fn bag(&mut self) {

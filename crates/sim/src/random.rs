@@ -54,8 +54,10 @@ pub(crate) fn uniform_at(seed: u64, key: u64) -> f64 {
 #[inline(always)]
 pub(crate) fn normal_at(seed: u64, key: u64) -> f64 {
     let bits = number_at(seed, key);
-    let part = |shift: u32| (bits >> shift) & 0xffff;
-    let sum = part(0).wrapping_add(part(16)).wrapping_add(part(32)).wrapping_add(part(48));
+    let sum = (bits & 0xffff)
+        .wrapping_add(bits >> 16 & 0xffff)
+        .wrapping_add(bits >> 32 & 0xffff)
+        .wrapping_add(bits >> 48 & 0xffff);
     // Of 18 bits, and numbers of 32 have vector instructions for the conversion.
     (f64::from(sum as i32) / 65_536.0 - 2.0) * SQRT_3
 }

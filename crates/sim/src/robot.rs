@@ -80,9 +80,7 @@ impl Robot {
     pub fn new(settings: &RobotSettings, mut random: Random) -> Self {
         let bias = settings.wheel_bias;
         // Wheels are never quite of the nominal size, so the odometry has a bias.
-        let mut about_one = || 1.0 + bias * random.normal();
-        let radius = [about_one(), about_one()];
-        let separation = about_one();
+        let [left, right, separation] = [0, 1, 2].map(|_| 1.0 + bias * random.normal());
         let start = Vector2::from(settings.start);
         Self {
             pose: Isometry2::new(start, settings.heading_deg.to_radians()),
@@ -90,7 +88,7 @@ impl Robot {
             wheels: [0.0; 2],
             measured: [0.0; 2],
             travelled: [0.0; 2],
-            radius,
+            radius: [left, right],
             half_separation_m: settings.half_separation_m * separation,
             commands: VecDeque::new(),
             given: WheelSpeeds::STOP,

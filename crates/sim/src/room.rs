@@ -48,49 +48,51 @@ pub fn room(settings: &RoomSettings) -> Object {
         paint
     };
     let half = 0.5 * WALL_M;
-    let slab = |centre: [f64; 3], sides: [f64; 3], of| {
-        let sides = Vector3::from(sides) * 0.5 + Vector3::repeat(half);
-        Shape::new(Form::Block(sides), Point3::from(centre), Rotation3::identity(), of)
-    };
     let (cx, cy, cz) = (0.5 * x, 0.5 * y, 0.5 * z);
     let door_y = 0.3 * y;
     let mut shapes = match &settings.ramp {
-        None => vec![slab([cx, cy, -half], [x, y, 0.0], floor(settings.floor))],
+        None => vec![wall_slab([cx, cy, -half], [x, y, 0.0], floor(settings.floor))],
         Some(ramp) => sloped_floor(ramp, [x, y], floor(settings.floor)).into(),
     };
     shapes.extend([
-        slab([cx, cy, z + half], [x, y, 0.0], Material::plain([0.75; 3])),
-        slab([-half, cy, cz], [0.0, y, z], wall),
-        slab([cx, -half, cz], [x, 0.0, z], wall),
-        slab([cx, y + half, cz], [x, 0.0, z], wall),
+        wall_slab([cx, cy, z + half], [x, y, 0.0], Material::plain([0.75; 3])),
+        wall_slab([-half, cy, cz], [0.0, y, z], wall),
+        wall_slab([cx, -half, cz], [x, 0.0, z], wall),
+        wall_slab([cx, y + half, cz], [x, 0.0, z], wall),
     ]);
     if settings.open_door {
         let [side, top] = DOOR_M;
         let (low, high) = (door_y - side, door_y + side);
-        let piece = |from: [f64; 2], to: [f64; 2]| {
+        for (from, to) in [
+            ([-WALL_M, -WALL_M], [low, z + WALL_M]),
+            ([high, -WALL_M], [y + WALL_M, z + WALL_M]),
+            ([low, top], [high, z + WALL_M]),
+        ] {
             let at = Point3::new(x + half, 0.5 * (from[0] + to[0]), 0.5 * (from[1] + to[1]));
             let sides = Vector3::new(WALL_M, to[0] - from[0], to[1] - from[1]) * 0.5;
-            Shape::new(Form::Block(sides), at, Rotation3::identity(), wall)
-        };
+            shapes.push(Shape::new(Form::Block(sides), at, Rotation3::identity(), wall));
+        }
         let behind = Material::plain([0.2, 0.19, 0.18]);
         let end = x + WALL_M + BEHIND_M;
+        let middle = 0.5 * (x + end);
         shapes.extend([
-            piece([-WALL_M, -WALL_M], [low, z + WALL_M]),
-            piece([high, -WALL_M], [y + WALL_M, z + WALL_M]),
-            piece([low, top], [high, z + WALL_M]),
-            slab([end + half, door_y, cz], [0.0, 3.0, z], behind),
-            slab([0.5 * (x + end), door_y, -half], [end - x, 3.0, 0.0], behind),
+            wall_slab([end + half, door_y, cz], [0.0, 3.0, z], behind),
+            wall_slab([middle, door_y, -half], [end - x, 3.0, 0.0], behind),
+            wall_slab([middle, door_y - 1.5, cz], [end - x, 0.0, z], behind),
+            wall_slab([middle, door_y + 1.5, cz], [end - x, 0.0, z], behind),
         ]);
-        shapes.extend(
-            [-1.5, 1.5]
-                .map(|side| slab([0.5 * (x + end), door_y + side, cz], [end - x, 0.0, z], behind)),
-        );
         shapes.extend(door_frame([x, door_y], &Rotation3::identity()));
     } else {
-        shapes.push(slab([x + half, cy, cz], [0.0, y, z], wall));
+        shapes.push(wall_slab([x + half, cy, cz], [0.0, y, z], wall));
         shapes.extend(door(x, door_y));
     }
     Object::new(shapes, None, false)
+}
+
+/// Returns a level block that is thicker by a wall than its sides, m.
+fn wall_slab(centre: [f64; 3], sides: [f64; 3], of: Material) -> Shape {
+    let sides = Vector3::from(sides) * 0.5 + Vector3::repeat(0.5 * WALL_M);
+    Shape::new(Form::Block(sides), Point3::from(centre), Rotation3::identity(), of)
 }
 
 /// Returns the level floor before a ramp, the ramp, and the level floor after it, in a room of this
@@ -99,16 +101,16 @@ fn sloped_floor(ramp: &Ramp, [x, y]: [f64; 2], of: Material) -> [Shape; 3] {
     let Ramp { from_m, length_m, rise_m } = ramp;
     let (half, end_m) = (0.5 * WALL_M, from_m + length_m);
     let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), -rise_m.atan2(*length_m));
-    let plate = |middle: [f64; 2], long: f64, turn: Rotation3<f64>| {
+    [
+        ([0.5 * from_m, 0.0], *from_m, Rotation3::identity()),
+        ([from_m + 0.5 * length_m, 0.5 * rise_m], length_m.hypot(*rise_m), turn),
+        ([0.5 * (end_m + x), *rise_m], (x - end_m).max(0.0), Rotation3::identity()),
+    ]
+    .map(|(middle, long, turn)| {
         let surface = Point3::new(middle[0], 0.5 * y, middle[1]);
         let sides = Vector3::new(0.5 * long, 0.5 * y + half, half);
         Shape::new(Form::Block(sides), surface - turn * Vector3::new(0.0, 0.0, half), turn, of)
-    };
-    [
-        plate([0.5 * from_m, 0.0], *from_m, Rotation3::identity()),
-        plate([from_m + 0.5 * length_m, 0.5 * rise_m], length_m.hypot(*rise_m), turn),
-        plate([0.5 * (end_m + x), *rise_m], (x - end_m).max(0.0), Rotation3::identity()),
-    ]
+    })
 }
 
 fn floor(kind: Floor) -> Material {
@@ -126,28 +128,31 @@ fn floor(kind: Floor) -> Material {
 /// A closed door with its frame on the wall at the far end.
 fn door(x: f64, y: f64) -> Vec<Shape> {
     let still = Rotation3::identity();
-    let block = |dy: f64, z: f64, half: [f64; 3], colour| {
-        let at = Point3::new(x, y + dy, z);
-        Shape::new(Form::Block(half.into()), at, still, Material::plain(colour))
-    };
     let mut shapes = door_frame([x, y], &still);
-    shapes.push(block(0.0, 1.0, [0.03, 0.45, 1.0], [0.36, 0.30, 0.22]));
-    shapes.push(block(0.35, 1.05, [0.07, 0.05, 0.012], [0.5; 3]));
+    for (dy, z, half, colour) in [
+        (0.0, 1.0, [0.03, 0.45, 1.0], [0.36, 0.30, 0.22]),
+        (0.35, 1.05, [0.07, 0.05, 0.012], [0.5; 3]),
+    ] {
+        let form = Form::Block(Vector3::from(half));
+        let at = Point3::new(x, y + dy, z);
+        shapes.push(Shape::new(form, at, still, Material::plain(colour)));
+    }
     shapes
 }
 
 /// Jambs and lintel of a doorway across X.
 fn door_frame(at: [f64; 2], turn: &Rotation3<f64>) -> Vec<Shape> {
     let [side, top] = DOOR_M;
-    let block = |y: f64, z: f64, half: [f64; 3]| {
+    [
+        (side + 0.04, 0.5 * top, [0.06, 0.04, 0.5 * top]),
+        (-side - 0.04, 0.5 * top, [0.06, 0.04, 0.5 * top]),
+        (0.0, top + 0.04, [0.06, side + 0.08, 0.04]),
+    ]
+    .map(|(y, z, half)| {
         let at = Point3::new(at[0], at[1], 0.0) + turn * Vector3::new(0.0, y, z);
         Shape::new(Form::Block(half.into()), at, *turn, Material::plain(WOOD))
-    };
-    vec![
-        block(side + 0.04, 0.5 * top, [0.06, 0.04, 0.5 * top]),
-        block(-side - 0.04, 0.5 * top, [0.06, 0.04, 0.5 * top]),
-        block(0.0, top + 0.04, [0.06, side + 0.08, 0.04]),
-    ]
+    })
+    .into()
 }
 
 /// Lamps in a row below the ceiling, bright enough together.
@@ -155,9 +160,13 @@ pub fn lamps(room: &RoomSettings, light: &LightSettings) -> Vec<Lamp> {
     let [x, y] = room.size_m;
     let z = room.height_m - 0.15;
     let direct = light.lux * (1.0 - light.ambient);
-    let place = |i: usize| (i as f64 + 0.5) / light.lamps as f64;
-    let hang = |i: usize| Point3::new(x * place(i), y * (0.35 + 0.3 * (i % 2) as f64), z);
-    (0..light.lamps).map(|i| Lamp::hanging(hang(i), direct * z * z)).collect()
+    let mut lamps = Vec::with_capacity(light.lamps);
+    for i in 0..light.lamps {
+        let along = x * ((i as f64 + 0.5) / light.lamps as f64);
+        let at = Point3::new(along, y * (0.35 + 0.3 * (i % 2) as f64), z);
+        lamps.push(Lamp::hanging(at, direct * z * z));
+    }
+    lamps
 }
 
 /// Random pieces along the walls, off the ways of robot and people and off each
@@ -174,8 +183,10 @@ pub fn clutter(scene: &Scene, random: &mut Random) -> Vec<Furniture> {
     let mut pieces = Vec::new();
     for _ in 0..scene.room.clutter {
         let mut tries = (0..TRIES).map(|_| random_piece(&scene.room, random));
-        let free = |at: Point2<f64>| ways.iter().all(|way| distance(way, &at) > OFF_THE_WAY_M);
-        if let Some(piece) = tries.find(|piece| free(Point2::from(piece.at))) {
+        let free = tries.find(|piece| {
+            ways.iter().all(|way| distance(way, &Point2::from(piece.at)) > OFF_THE_WAY_M)
+        });
+        if let Some(piece) = free {
             ways.push(vec![Point2::from(piece.at)]);
             pieces.push(piece);
         }
@@ -210,37 +221,38 @@ fn random_piece(room: &RoomSettings, random: &mut Random) -> Furniture {
 
 /// Distance of a place from a polyline of one point at least.
 pub fn distance(way: &[Point2<f64>], place: &Point2<f64>) -> f64 {
-    let to_segment = |pair: &[Point2<f64>]| {
+    let to_segments = way.windows(2).map(|pair| {
         let along = pair[1] - pair[0];
         let part = (place - pair[0]).dot(&along) / along.norm_squared().max(1e-12);
         (place - (pair[0] + along * part.clamp(0.0, 1.0))).norm()
-    };
+    });
     let to_points = way.iter().map(|point| (place - point).norm());
-    way.windows(2).map(to_segment).chain(to_points).fold(f64::INFINITY, f64::min)
+    to_segments.chain(to_points).fold(f64::INFINITY, f64::min)
 }
 
 /// Returns the obstacles that people walk around.
 pub fn obstacles(piece: &Furniture) -> Vec<Obstacle> {
     let turn = Rotation2::new(piece.heading_deg.to_radians());
-    let round = |aside: f64, radius_m: f64| {
-        let at = Point2::from(piece.at) + turn * Vector2::new(0.0, aside);
-        Obstacle::standing(at, radius_m)
-    };
-    match piece.kind {
-        FurnitureKind::Desk => vec![round(0.0, 0.75)],
-        FurnitureKind::Shelf => vec![round(0.0, 0.45)],
+    // How far each is aside, and its radius.
+    let discs: &[(f64, f64)] = match piece.kind {
+        FurnitureKind::Desk => &[(0.0, 0.75)],
+        FurnitureKind::Shelf => &[(0.0, 0.45)],
         // The jambs are thin: people keep to the middle anyway.
-        FurnitureKind::Doorway => [(0.6, 0.05), (0.85, 0.2), (1.1, 0.2)]
-            .iter()
-            .flat_map(|(y, r)| [round(*y, *r), round(-y, *r)])
-            .collect(),
-        FurnitureKind::Partition => [-0.65, 0.0, 0.65].map(|y| round(y, 0.35)).into(),
-        FurnitureKind::GlassDoor | FurnitureKind::Mirror => {
-            [-0.3, 0.3].map(|y| round(y, 0.25)).into()
+        FurnitureKind::Doorway => {
+            &[(0.6, 0.05), (-0.6, 0.05), (0.85, 0.2), (-0.85, 0.2), (1.1, 0.2), (-1.1, 0.2)]
         }
-        FurnitureKind::GlassWall => [-0.9, -0.3, 0.3, 0.9].map(|y| round(y, 0.3)).into(),
-        _ => vec![round(0.0, 0.3)],
-    }
+        FurnitureKind::Partition => &[(-0.65, 0.35), (0.0, 0.35), (0.65, 0.35)],
+        FurnitureKind::GlassDoor | FurnitureKind::Mirror => &[(-0.3, 0.25), (0.3, 0.25)],
+        FurnitureKind::GlassWall => &[(-0.9, 0.3), (-0.3, 0.3), (0.3, 0.3), (0.9, 0.3)],
+        _ => &[(0.0, 0.3)],
+    };
+    discs
+        .iter()
+        .map(|(aside, radius_m)| {
+            let at = Point2::from(piece.at) + turn * Vector2::new(0.0, *aside);
+            Obstacle::standing(at, *radius_m)
+        })
+        .collect()
 }
 
 /// Returns the solids of a piece of furniture. Its cloth, tone, size, proportions and parts are
@@ -583,10 +595,10 @@ mod tests {
                 assert!(pieces.len() >= 5, "{}", pieces.len());
                 let ways = [[[1.0, 3.0], [6.0, 2.0]], [[5.0, 0.5], [5.0, 5.5]]];
                 for piece in &pieces {
-                    let off = |way: &[[f64; 2]; 2]| {
-                        distance(&way.map(Point2::from), &Point2::from(piece.at))
-                    };
-                    assert!(ways.iter().all(|way| off(way) > 0.7), "{piece:?}");
+                    for way in ways {
+                        let off = distance(&way.map(Point2::from), &Point2::from(piece.at));
+                        assert!(off > 0.7, "{piece:?}: {off}");
+                    }
                 }
                 assert!(!layouts.contains(&pieces));
                 layouts.push(pieces);
@@ -632,9 +644,8 @@ mod tests {
             }
             assert!(all.iter().flatten().all(is_sane), "{kind:?}");
         }
-        let parts = |kind| (0..20).map(|seed| forms(kind, seed).len()).collect::<Vec<_>>();
         for kind in [K::CoatStand, K::FloorLamp, K::Plant, K::BinOnTable] {
-            let parts = parts(kind);
+            let parts: Vec<usize> = (0..20).map(|seed| forms(kind, seed).len()).collect();
             assert!(parts.iter().max() > parts.iter().min(), "{kind:?}: {parts:?}");
         }
     }

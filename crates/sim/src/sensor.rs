@@ -389,14 +389,13 @@ struct DepthRow {
 
 impl DepthRow {
     fn new(width: usize) -> Self {
-        let numbers = || vec![0.0; width];
         Self {
             off: [vec![0; width], vec![0; width]],
-            t: numbers(),
-            infrared: numbers(),
-            facing: numbers(),
+            t: vec![0.0; width],
+            infrared: vec![0.0; width],
+            facing: vec![0.0; width],
             patches: vec![0.0; width.div_ceil(PATCH)],
-            coarse: numbers(),
+            coarse: vec![0.0; width],
             depth_m: vec![f32::NAN; width],
         }
     }
@@ -546,15 +545,14 @@ mod tests {
     #[test]
     fn exposure_brings_light_and_dark_rooms_to_one_brightness() {
         let moment = Moment { seed: 1, smear_px: 0.0, gain: 1.0 };
-        let mean_and_noise = |light: f64| {
+        let [(bright, little), (dark, much)] = [300.0, 6.0].map(|light| {
             let hit = Hit { light: [light; 3], ..wall(2.0, 0.5) };
             let seen = HitImage::from_fn(64, 64, |_, _| hit);
             let grey = Exposure::default().grey(&seen, &moment);
             let row = &grey.row(32)[24..40];
             let mean = row.iter().map(|v| f64::from(*v)).sum::<f64>() / 16.0;
             (mean, row.iter().map(|v| (f64::from(*v) - mean).powi(2)).sum::<f64>() / 16.0)
-        };
-        let ((bright, little), (dark, much)) = (mean_and_noise(300.0), mean_and_noise(6.0));
+        });
         assert!((bright - dark).abs() < 12.0, "{bright} {dark}");
         assert!(much > 2.0 * little, "{little} {much}");
     }
@@ -562,12 +560,13 @@ mod tests {
     /// Surfaces that differ from pixel to pixel.
     fn mixed(width: usize, height: usize, seed: u64) -> HitImage {
         HitImage::from_fn(width, height, |x, y| {
-            let part = |salt: u64| uniform_at(seed ^ salt, (y * width + x) as u64);
+            let part = [0, 1, 2, 3, 4, 5, 6, 7]
+                .map(|salt| uniform_at(seed ^ salt, (y * width + x) as u64));
             Hit {
-                t: 2.0 + (y % 8) as f64 + 0.1 * part(1) - if part(7) < 0.02 { 1.7 } else { 0.0 },
-                light: [300.0 * part(2), 90.0 * part(3), 60.0 * part(4)],
-                infrared: part(5),
-                facing: part(6) - 0.1,
+                t: 2.0 + (y % 8) as f64 + 0.1 * part[1] - if part[7] < 0.02 { 1.7 } else { 0.0 },
+                light: [300.0 * part[2], 90.0 * part[3], 60.0 * part[4]],
+                infrared: part[5],
+                facing: part[6] - 0.1,
                 person: None,
             }
         })
@@ -578,17 +577,16 @@ mod tests {
         let row = (0..seen.width() as i64).map(|x| seen.get(x, y as i64).unwrap());
         let row: Vec<f32> = row.map(|hit| (luma(hit.light) * factor) as f32).collect();
         let last = row.len() - 1;
-        let mean = |x: usize| {
+        let means = (0..row.len()).map(|x| {
             let part = &row[x.saturating_sub(reach)..=(x + reach).min(last)];
             part.iter().sum::<f32>() / part.len() as f32
-        };
-        let smeared: Vec<f32> = (0..row.len()).map(mean).collect();
-        let soft = |x: usize| match x {
-            0 => smeared[0],
-            x if x == last => smeared[last],
-            x => 0.25 * (smeared[x - 1] + 2.0 * smeared[x] + smeared[x + 1]),
-        };
-        (0..row.len()).map(soft).collect()
+        });
+        let smeared: Vec<f32> = means.collect();
+        let mut soft = smeared.clone();
+        for x in 1..last {
+            soft[x] = 0.25 * (smeared[x - 1] + 2.0 * smeared[x] + smeared[x + 1]);
+        }
+        soft
     }
 
     /// A grey image, pixel by pixel.
@@ -628,8 +626,9 @@ mod tests {
             let mut row = Vec::new();
             for x in 0..seen.width() as u64 {
                 let key = y * seen.width() as u64 + x;
-                let off = |salt| (EDGE_JITTER_PX * normal_at(seed ^ salt, key)).round() as i64;
-                let there = seen.get(x as i64 + off(0x54), y as i64 + off(0x55));
+                let [across, down] = [0x54, 0x55]
+                    .map(|salt| (EDGE_JITTER_PX * normal_at(seed ^ salt, key)).round() as i64);
+                let there = seen.get(x as i64 + across, y as i64 + down);
                 let hit = there.unwrap_or_else(|| seen.get(x as i64, y as i64).unwrap());
                 let light = hit.infrared * hit.facing.max(0.0) / (hit.t * hit.t);
                 let coarse = 0.5 + uniform_at(seed ^ 0x51, ((y / 4) << 20) | (x / 4));

@@ -43,13 +43,16 @@ pub fn before<'a>(
     eye: &Point3<f64>,
     forward: &Vector3<f64>,
 ) -> Vec<SightedSolid<'a>> {
-    let sight = |(number, (person, shape)): (u32, (Option<u16>, &'a Shape))| {
+    let mut sights = Vec::new();
+    for (number, (person, shape)) in (0..).zip(solids) {
         let way = shape.origin - eye;
         let nearest = forward.dot(&way) - shape.extent(&-forward);
-        SightedSolid { number, person, shape, seen: shape.seen_from(eye), nearest, way, eye: *eye }
-    };
-    let mut sights: Vec<_> =
-        (0..).zip(solids).map(sight).filter(|sight| sight.reaches(forward)).collect();
+        let seen = shape.seen_from(eye);
+        let sight = SightedSolid { number, person, shape, seen, nearest, way, eye: *eye };
+        if sight.reaches(forward) {
+            sights.push(sight);
+        }
+    }
     sights.sort_by(|a, b| a.nearest.total_cmp(&b.nearest));
     sights
 }

@@ -230,9 +230,8 @@ impl Simulation {
     /// The start of a scene. `threads` draw the images.
     pub fn new(scene: &Scene, threads: usize) -> Self {
         // A stream for each purpose: one more chair must not change the gait of the people.
-        let stream = |number| Random::new(scene.seed, number);
         let mut pieces = scene.furniture.clone();
-        pieces.extend(room::clutter(scene, &mut stream(1)));
+        pieces.extend(room::clutter(scene, &mut Random::new(scene.seed, 1)));
         pieces.extend(chairs(scene));
         let obstacles: Vec<Obstacle> = pieces.iter().flat_map(room::obstacles).collect();
         let mut fixed = vec![room::room(&scene.room)];
@@ -241,20 +240,22 @@ impl Simulation {
             fixed.push(day.windows(&scene.room));
             lamps.extend(day.sun(&scene.room));
         }
-        let (ceiling_m, mut chance) = (scene.room.height_m, stream(8));
+        let ceiling_m = scene.room.height_m;
+        let mut chance = Random::new(scene.seed, 8);
         fixed.extend(pieces.iter().map(|piece| {
             let floor_m = scene.room.floor_m(&piece.at.into());
             room::furniture(piece, ceiling_m - floor_m, &mut chance).raised(floor_m)
         }));
         fixed.extend(scene.blocks.iter().map(|block| block.solid(ceiling_m)));
         let mirror = (scene.camera.kind == CameraKind::Panorama)
-            .then(|| MirrorCamera::new(&scene.camera, &mut stream(6)));
+            .then(|| MirrorCamera::new(&scene.camera, &mut Random::new(scene.seed, 6)));
         let camera = mirror
             .as_ref()
             .map_or_else(|| camera(scene), |mirror| mirror.camera(scene.camera.height_m));
-        let mut walkers = walkers(scene, &obstacles, &mut stream(3));
-        walkers.extend(approaching_person(scene, &mut stream(9)));
-        let true_camera = shaken(&camera, scene.camera.mount_error_deg, &mut stream(2));
+        let mut walkers = walkers(scene, &obstacles, &mut Random::new(scene.seed, 3));
+        walkers.extend(approaching_person(scene, &mut Random::new(scene.seed, 9)));
+        let mut error = Random::new(scene.seed, 2);
+        let true_camera = shaken(&camera, scene.camera.mount_error_deg, &mut error);
         Self {
             first_camera: true_camera.clone(),
             true_camera,
@@ -269,10 +270,10 @@ impl Simulation {
             pieces,
             obstacles,
             blocks: crowd::blocks(scene),
-            robot: Robot::new(&scene.robot, stream(4)),
+            robot: Robot::new(&scene.robot, Random::new(scene.seed, 4)),
             exposures: [Exposure::new(threads); 2],
             canvases: Vec::new(),
-            chance: stream(5),
+            chance: Random::new(scene.seed, 5),
             now_ns: 0,
             shots: 0,
             waiting: BTreeMap::new(),
@@ -498,12 +499,13 @@ impl Simulation {
         let nod = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), self.robot.nod_rad());
         let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), planar.rotation.angle());
         let at = Point2::from(planar.translation.vector);
-        let at_m = |dx: f64| self.scene.room.floor_m(&(at + Vector2::new(dx, 0.0)));
-        let rise = at_m(STANDS_ON_M) - at_m(-STANDS_ON_M);
+        let [before_m, at_m, behind_m] = [STANDS_ON_M, 0.0, -STANDS_ON_M]
+            .map(|dx| self.scene.room.floor_m(&(at + Vector2::new(dx, 0.0))));
+        let rise = before_m - behind_m;
         // A rising floor lifts the nose of a robot that looks along the room.
         let slope =
             UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -rise.atan2(2.0 * STANDS_ON_M));
-        Isometry3::from_parts(Translation3::new(at.x, at.y, at_m(0.0)), slope * yaw * nod)
+        Isometry3::from_parts(Translation3::new(at.x, at.y, at_m), slope * yaw * nod)
     }
 
     fn moment(&self, eye: u64, gain: f64) -> Moment {
@@ -532,13 +534,16 @@ impl Simulation {
         self.walk(now_s, offset_s);
         let (world, _) = self.world();
         let mut seen = self.canvas();
-        let pose = |part| self.world_from_robot(part);
-        let camera = &self.true_camera;
-        let view = WorldCamera { world: &world, camera, pose: &pose, lit: false };
-        view.draw_over(&mut seen, self.threads);
+        self.draw_over(&mut seen, &world, &self.true_camera, false);
         (self.robot, self.walkers) = (robot, walkers);
         self.approacher = approacher;
         Some(seen)
+    }
+
+    /// Draws what a camera of the robot sees.
+    fn draw_over(&self, seen: &mut HitImage, world: &World, camera: &Camera, lit: bool) {
+        let view = WorldCamera { world, camera, pose: &|part| self.world_from_robot(part), lit };
+        view.draw_over(seen, self.threads);
     }
 
     fn rgbd(&mut self, seen: &HitImage) -> Images {
@@ -577,9 +582,7 @@ impl Simulation {
         let tilt = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), tilt);
         camera.robot_from_camera *= Isometry3::from_parts(aside, tilt);
         let mut right = self.canvas();
-        let pose = |part| self.world_from_robot(part);
-        let view = WorldCamera { world, camera: &camera, pose: &pose, lit: true };
-        view.draw_over(&mut right, self.threads);
+        self.draw_over(&mut right, world, &camera, true);
         // The two sensors of a pair never expose quite alike.
         let moments = [self.moment(0, 1.0), self.moment(1, 1.03)];
         let grey = self.exposures[0].grey(left, &moments[0]);
@@ -672,11 +675,11 @@ fn camera(scene: &Scene) -> Camera {
 /// Returns the camera as mounted by hand, with errors about the pose that the log states.
 fn shaken(camera: &Camera, degrees: f64, random: &mut Random) -> Camera {
     // Clamped at two deviations, because a worse mount would be noticed and corrected.
-    let mut error = || degrees * random.normal().clamp(-2.0, 2.0);
-    let angles = Vector3::new(error(), error(), error()).map(f64::to_radians);
-    let shift = Vector3::new(error(), error(), error()) * 0.01;
-    let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::new(angles));
-    let off = Isometry3::from_parts(Translation3::from(shift), turn);
+    let [angles, shift] = [0, 1]
+        .map(|_| Vector3::from([0, 1, 2].map(|_| degrees * random.normal().clamp(-2.0, 2.0))));
+    let turn = Rotation3::new(angles.map(f64::to_radians));
+    let turn = UnitQuaternion::from_rotation_matrix(&turn);
+    let off = Isometry3::from_parts(Translation3::from(shift * 0.01), turn);
     Camera { robot_from_camera: camera.robot_from_camera * off, ..camera.clone() }
 }
 

@@ -68,12 +68,11 @@ fn resolve<T>(
 ) -> Result<T, ConfigError> {
     let set: Vec<Change> =
         variant.set.iter().enumerate().map(|(i, s)| argument(text, i, s)).collect();
-    let is_set = |key: &str| set.iter().any(|c| is_within(key, &c.key));
     let mut written = DeTable::parse(text)?.into_inner();
     let mut rules = Rule::all(written.remove("vary"))?;
-    rules.retain(|rule| !is_set(&rule.key));
     // A seed that was set counts for what is drawn, too.
     apply(&mut written, set.iter().filter(|change| change.key == "seed"))?;
+    rules.retain(|rule| !set.iter().any(|change| is_within(&rule.key, &change.key)));
     let seed = variant.choose(seed_of(&written))?;
     let drawn: Vec<Change> = rules.iter().filter_map(|rule| rule.draw(seed)).collect();
     let mut own = written;
@@ -309,8 +308,12 @@ impl Rule {
 
     /// The entries of a list that a split may have.
     fn entries<'a>(&self, values: &'a [toml::Value], split: Split) -> Vec<&'a toml::Value> {
-        let open = |index: usize| !self.apart || split.has_entry(index);
-        values.iter().enumerate().filter(|(i, _)| open(*i)).map(|(_, value)| value).collect()
+        values
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| !self.apart || split.has_entry(*i))
+            .map(|(_, value)| value)
+            .collect()
     }
 
     /// The copy of another value, if that is the rule.

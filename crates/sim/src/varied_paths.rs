@@ -71,20 +71,20 @@ impl Scene {
     /// Exchanges left and right.
     fn mirror(&mut self) {
         let width_m = self.room.size_m[1];
-        let mirrored = |point: &mut [f64; 2]| point[1] = width_m - point[1];
+        let RobotSettings { start, path, heading_deg, .. } = &mut self.robot;
+        let of_people = self.people.iter_mut().flat_map(|person| &mut person.path);
+        let of_furniture = self.furniture.iter_mut().map(|piece| &mut piece.at);
+        for point in of_people.chain(of_furniture).chain(path).chain([start]) {
+            point[1] = width_m - point[1];
+        }
         for person in &mut self.people {
-            person.path.iter_mut().for_each(mirrored);
             person.offset[1] = -person.offset[1];
             person.heading_deg = person.heading_deg.map(|heading_deg| -heading_deg);
             person.spin_deg_per_s = -person.spin_deg_per_s;
         }
         for piece in &mut self.furniture {
-            mirrored(&mut piece.at);
             piece.heading_deg = -piece.heading_deg;
         }
-        let RobotSettings { start, path, heading_deg, .. } = &mut self.robot;
-        mirrored(start);
-        path.iter_mut().for_each(mirrored);
         *heading_deg = -*heading_deg;
         if let Some(approach) = &mut self.approach {
             approach.bearing_deg = -approach.bearing_deg;

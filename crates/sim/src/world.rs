@@ -195,13 +195,8 @@ impl World {
     ) -> Hit {
         let Material { reflects, passes, .. } = of.material;
         let at = eye + ray * seen.t;
-        let look = |ray: &Vector3<f64>| {
-            let others = self.solids().filter(|(_, other)| !ptr::eq(*other, of));
-            meet(others, &at, ray)
-                .map_or(Hit::NOTHING, |(t, person, shape)| self.hit(t, person, shape, (&at, ray)).0)
-        };
-        let image = Hit { person: None, ..look(&mirrored(ray, normal)) };
-        let behind = if passes > 0.0 { look(ray) } else { Hit::NOTHING };
+        let image = Hit { person: None, ..self.look_from(of, &at, &mirrored(ray, normal)) };
+        let behind = if passes > 0.0 { self.look_from(of, &at, ray) } else { Hit::NOTHING };
         let own = 1.0 - reflects - passes;
         let light = std::array::from_fn(|c| {
             own * seen.light[c] + reflects * image.light[c] + passes * behind.light[c]
@@ -209,6 +204,13 @@ impl World {
         // Projected dots go the way of most of the light, there and back.
         let (share, main) = if passes > reflects { (passes, behind) } else { (reflects, image) };
         Hit { t: seen.t + main.t, light, infrared: share * share * main.infrared, ..main }
+    }
+
+    /// Returns what a ray from a point of a shape meets first.
+    fn look_from(&self, of: &Shape, at: &Point3<f64>, ray: &Vector3<f64>) -> Hit {
+        let others = self.solids().filter(|(_, other)| !ptr::eq(*other, of));
+        meet(others, at, ray)
+            .map_or(Hit::NOTHING, |(t, person, shape)| self.hit(t, person, shape, (at, ray)).0)
     }
 
     /// Returns the surface of a solid that a ray from an eye meets after `t` lengths of it, and its

@@ -97,8 +97,10 @@ fn differing<const D: usize>(
     let l: [u8; BYTES] = std::array::from_fn(|byte| left.planes[byte][x]);
     let r: [&[u8]; BYTES] = std::array::from_fn(|byte| &right.planes[byte][from..from + D]);
     for d in 0..D {
-        let differ = |byte: usize| (l[byte] ^ r[byte][d]).count_ones() as u8;
-        costs[d] = differ(0).wrapping_add(differ(1)).wrapping_add(differ(2));
+        let first = (l[0] ^ r[0][d]).count_ones() as u8;
+        let second = (l[1] ^ r[1][d]).count_ones() as u8;
+        let third = (l[2] ^ r[2][d]).count_ones() as u8;
+        costs[d] = first.wrapping_add(second).wrapping_add(third);
     }
 }
 

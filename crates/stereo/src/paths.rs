@@ -132,16 +132,18 @@ pub fn sums<const D: usize>(
         let here = place::<D>(x + 1);
         // The path from the right has already added to the right half.
         let mut sum = if 2 * x <= last { [0; D] } else { sums[x] };
-        let large = |from: usize| jump(penalties, row[x], row_above[from]);
         let west = x.saturating_sub(1);
         let east = (x + 1).min(last);
-        let after = step(cost, &left.cells[before..], small, large(west), &mut sum);
+        let large = jump(penalties, row[x], row_above[west]);
+        let after = step(cost, &left.cells[before..], small, large, &mut sum);
         left.cells[before + 1..=before + D].copy_from_slice(&waiting);
         waiting = after;
-        let after = step(cost, &above.cells[here..], small, large(x), &mut sum);
+        let large = jump(penalties, row[x], row_above[x]);
+        let after = step(cost, &above.cells[here..], small, large, &mut sum);
         above.cells[here + 1..=here + D].copy_from_slice(&after);
         let next = place::<D>(x + 2);
-        let after = step(cost, &right.cells[next..], small, large(east), &mut sum);
+        let large = jump(penalties, row[x], row_above[east]);
+        let after = step(cost, &right.cells[next..], small, large, &mut sum);
         right.cells[here + 1..=here + D].copy_from_slice(&after);
         let large = jump(penalties, row[x], row[west]);
         from_left = step_on(cost, &from_left, small, large, &mut sum);

@@ -103,25 +103,36 @@ fn find(left: &GreyImage, right: &GreyImage, (x, y): (usize, usize), reach: i32)
         .filter(|s| (radius..right.width() as i32 - radius).contains(&(x as i32 - s)))
         .collect();
     let rows = -UP_DOWN..=UP_DOWN;
-    let cost = |shift: i32, down: i32| {
-        difference(left, right, (x, y), ((x as i32 - shift) as usize, (y as i32 + down) as usize))
-    };
+    let pair = [left, right];
     let all: Vec<(f32, i32, i32)> = rows
         .flat_map(|down| shifts.iter().map(move |shift| (*shift, down)))
-        .map(|(shift, down)| (cost(shift, down), shift, down))
+        .map(|(shift, down)| (cost_of_shift(pair, (x, y), shift, down), shift, down))
         .collect();
     let best = *all.iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
     // Matches beside the best one are part of the same minimum and no rivals.
-    let far = |c: &&(f32, i32, i32)| (c.1 - best.1).abs() > 2 || (c.2 - best.2).abs() > 2;
-    let rival = all.iter().filter(far).map(|c| c.0).fold(f32::INFINITY, f32::min);
+    let rival = all
+        .iter()
+        .filter(|c| (c.1 - best.1).abs() > 2 || (c.2 - best.2).abs() > 2)
+        .map(|c| c.0)
+        .fold(f32::INFINITY, f32::min);
     let inside = best.2.abs() < UP_DOWN;
     (inside && best.0 < DISTINCT * rival).then(|| {
-        let above = cost(best.1, best.2 - 1);
-        let below = cost(best.1, best.2 + 1);
+        let above = cost_of_shift(pair, (x, y), best.1, best.2 - 1);
+        let below = cost_of_shift(pair, (x, y), best.1, best.2 + 1);
         let rise = above.max(below) - best.0;
         let offset = if rise > 0.0 { 0.5 * (above - below) / rise } else { 0.0 };
         Shift { left: best.1, down: f64::from(best.2) + f64::from(offset) }
     })
+}
+
+/// Returns the difference of the images where the right one is shifted by so many pixels.
+fn cost_of_shift(
+    [left, right]: [&GreyImage; 2],
+    (x, y): (usize, usize),
+    shift: i32,
+    down: i32,
+) -> f32 {
+    difference(left, right, (x, y), ((x as i32 - shift) as usize, (y as i32 + down) as usize))
 }
 
 /// Returns the mean difference of two patches, apart from their mean brightness.

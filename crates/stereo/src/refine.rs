@@ -138,12 +138,11 @@ fn levels(row: &[u8], padded: &mut Vec<u8>, levels: &mut Vec<[f32; 2]>) {
     levels.resize(width + 1, [0.0; 2]);
     let padded = &padded[..width + 4];
     for (x, level) in levels[..width].iter_mut().enumerate() {
-        let at = |i: usize| i32::from(padded[x + i]);
-        let a = at(0);
-        let b = at(1);
-        let c = at(2);
-        let d = at(3);
-        let e = at(4);
+        let a = i32::from(padded[x]);
+        let b = i32::from(padded[x + 1]);
+        let c = i32::from(padded[x + 2]);
+        let d = i32::from(padded[x + 3]);
+        let e = i32::from(padded[x + 4]);
         *level = [0.25 * (b + 2 * c + d) as f32, 0.125 * (e + 2 * (d - b) - a) as f32];
     }
     levels[width] = levels[width - 1];
@@ -239,8 +238,10 @@ fn gain(left: &[[f32; 2]], disparities: &[f32], right: &[f32]) -> f32 {
         ll += known * own * own;
         rr += known * other * other;
     }
-    let contrast = |sum: f32, squares: f32| squares - sum * sum / n.max(1.0) + FAINT * n.max(1.0);
-    (contrast(r, rr) / contrast(l, ll)).sqrt().clamp(0.5, 2.0)
+    let n = n.max(1.0);
+    let own = ll - l * l / n + FAINT * n;
+    let other = rr - r * r / n + FAINT * n;
+    (other / own).sqrt().clamp(0.5, 2.0)
 }
 
 /// Sums up over the part of a window's row that is of one surface, around the means.

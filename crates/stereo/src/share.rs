@@ -2,6 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 use std::thread;
+use std::vec::IntoIter;
 
 /// Returns the rows of a band of an image, of which there is one for each thread.
 pub fn band_rows(height: usize, threads: usize) -> usize {
@@ -14,17 +15,19 @@ pub fn share<J: Send>(jobs: impl IntoIterator<Item = J>, work: impl Fn(J) + Sync
     let jobs: Vec<J> = jobs.into_iter().collect();
     let count = jobs.len();
     let queue = Mutex::new(jobs.into_iter());
-    let labour = || {
-        while let Some(job) = next(&queue) {
-            work(job);
-        }
-    };
     thread::scope(|scope| {
         for _ in 1..count {
-            let _ = thread::Builder::new().spawn_scoped(scope, labour);
+            let _ = thread::Builder::new().spawn_scoped(scope, || do_jobs(&queue, &work));
         }
-        labour();
+        do_jobs(&queue, &work);
     });
+}
+
+/// Does jobs until none is left.
+fn do_jobs<J>(queue: &Mutex<IntoIter<J>>, work: &impl Fn(J)) {
+    while let Some(job) = next(queue) {
+        work(job);
+    }
 }
 
 /// Takes the next job; the lock is held no longer than that.

@@ -143,16 +143,19 @@ fn find_textured(rows: [&[u8]; 3], least: u8, textured: &mut [u32]) {
         a.wrapping_add(b.wrapping_mul(2)).wrapping_add(c).abs() / 2
     }
 
-    let mask = |slope: i16| if slope >= i16::from(least) { u32::MAX } else { 0 };
+    fn mask(slope: i16, least: u8) -> u32 {
+        if slope >= i16::from(least) { u32::MAX } else { 0 }
+    }
+
     let last = textured.len() - 1;
     for (x, from, to) in [(0, 0, 1.min(last)), (last, last.saturating_sub(1), last)] {
-        textured[x] = mask(slope(rows.map(|row| rise(row[from], row[to]))));
+        textured[x] = mask(slope(rows.map(|row| rise(row[from], row[to]))), least);
     }
     let Some(middle) = textured.get_mut(1..last) else { return };
     let width = middle.len();
     let [a, b, c] = rows.map(|row| (&row[..width], &row[2..width + 2]));
     for (x, textured) in middle.iter_mut().enumerate() {
         let rises = [a, b, c].map(|(left, right)| rise(left[x], right[x]));
-        *textured = mask(slope(rises));
+        *textured = mask(slope(rises), least);
     }
 }

@@ -65,15 +65,19 @@ impl Winners {
     ) -> u32 {
         // Index of right columns: offset by the longest shift to the left.
         const REACH: usize = 256;
+
+        // Iterators that count check for an overflow, which takes as long as the rest.
+        fn match_of(x: usize, disparity: u8) -> usize {
+            x.wrapping_add(REACH - usize::from(disparity))
+        }
+
         let width = self.disparity.len();
         let disparity = &self.disparity[..width];
         let cost = &self.cost[..width];
-        // Iterators that count check for an overflow, which takes as long as the rest.
-        let match_of = |x: usize| x.wrapping_add(REACH - usize::from(disparity[x]));
         best.clear();
         best.resize(width + REACH, u16::MAX);
         for x in 0..width {
-            let best = &mut best[match_of(x)];
+            let best = &mut best[match_of(x, disparity[x])];
             // Cost in the high byte, disparity in the low one: the minimum of both is one
             // comparison.
             *best = (*best).min(u16::from_be_bytes([cost[x], disparity[x]]));
@@ -81,7 +85,7 @@ impl Winners {
         back.resize(width, 0);
         let back = &mut back[..width];
         for x in 0..width {
-            [_, back[x]] = best[match_of(x)].to_be_bytes();
+            [_, back[x]] = best[match_of(x, disparity[x])].to_be_bytes();
         }
         leave_agreeing(disparity, back, tolerance, disparities)
     }

@@ -20,20 +20,23 @@ fn resident_bytes() -> Option<i64> {
 
 /// Generates a pair with another texture in each frame.
 fn frame(index: u64) -> Frame {
-    let pattern = |x: usize, y: usize| {
-        let h = ((x / 3) as u32).wrapping_mul(0x9E37_79B1) ^ ((y / 3) as u32 + index as u32);
-        (h.wrapping_mul(0x85EB_CA77) >> 25) as u8 + 60
-    };
     let lens = Pinhole { fx: 215.0, fy: 215.0, cx: 48.0, cy: 32.0, distortion: Distortion::None };
     let camera = Arc::new(Camera::mounted(lens, SIZE.0, SIZE.1, 1.0, 0.0, 0.0));
     let shift = 6 + index as usize % 9;
-    let right = GreyImage::from_fn(SIZE.0, SIZE.1, |x, y| pattern(x + shift, y));
+    let left = GreyImage::from_fn(SIZE.0, SIZE.1, |x, y| pattern_at(index, x, y));
+    let right = GreyImage::from_fn(SIZE.0, SIZE.1, |x, y| pattern_at(index, x + shift, y));
     let images = Images {
-        grey: Some(Arc::new(GreyImage::from_fn(SIZE.0, SIZE.1, pattern))),
+        grey: Some(Arc::new(left)),
         right: Some(Arc::new(RightImage { image: right, baseline_m: 0.12 })),
         ..Images::default()
     };
     Frame::new(index, Stamp::default(), camera, EgoMotion::at_rest(0.1), images)
+}
+
+/// Returns a pixel of the pattern that an image shows.
+fn pattern_at(index: u64, x: usize, y: usize) -> u8 {
+    let h = ((x / 3) as u32).wrapping_mul(0x9E37_79B1) ^ ((y / 3) as u32 + index as u32);
+    (h.wrapping_mul(0x85EB_CA77) >> 25) as u8 + 60
 }
 
 #[test]
@@ -45,14 +48,12 @@ fn memory_is_flat() {
     for method in [Method::Block, Method::SemiGlobal] {
         let settings = StereoSettings { method, threads: 1, ..StereoSettings::default() };
         let mut stereo = StereoDepth::new(settings).unwrap();
-        let mut after = |frames: std::ops::Range<u64>| {
+        let [early, late] = [0..12, 12..60].map(|frames| {
             for index in frames {
                 stereo.depth(&frame(index), &mut Funnel::default()).unwrap();
             }
             resident_bytes().unwrap()
-        };
-        let early = after(0..12);
-        let late = after(12..60);
+        });
         assert!(late - early < MOST_BYTES, "{method:?}: {early} to {late} bytes");
     }
 }

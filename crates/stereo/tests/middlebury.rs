@@ -69,16 +69,15 @@ fn grey(path: &Path) -> GreyImage {
 
 /// Marks the pixels of the left view that a nearer one hides in the right view.
 fn hidden(truth: &[f32]) -> Vec<bool> {
-    let seen_at = |x: usize| x as i64 - truth[x].round() as i64;
+    let seen_at: Vec<Option<usize>> =
+        truth.iter().zip(0..).map(|(d, x)| usize::try_from(x - d.round() as i64).ok()).collect();
     let mut nearest = vec![0.0_f32; truth.len()];
-    for (x, d) in truth.iter().enumerate() {
-        if let Ok(at) = usize::try_from(seen_at(x)) {
+    for (at, d) in seen_at.iter().zip(truth) {
+        if let Some(at) = *at {
             nearest[at] = nearest[at].max(*d);
         }
     }
-    (0..truth.len())
-        .map(|x| usize::try_from(seen_at(x)).map_or(true, |at| nearest[at] > truth[x] + 1.0))
-        .collect()
+    seen_at.iter().zip(truth).map(|(at, d)| at.is_none_or(|at| nearest[at] > d + 1.0)).collect()
 }
 
 /// Returns the bad pixels, %: of all off by more than 1 and 2 px, and of the visible ones. A pixel
@@ -109,10 +108,8 @@ struct Judged {
 }
 
 fn judge(folder: &Path, pair: &Pair, settings: &StereoSettings) -> Judged {
-    let image = |name: &str| grey(&folder.join(pair.name).join(name));
-    let left = image("im2.png");
-    let right = image("im6.png");
-    let truth = image("disp2.png");
+    let [left, right, truth] =
+        ["im2.png", "im6.png", "disp2.png"].map(|name| grey(&folder.join(pair.name).join(name)));
     let truth: Vec<f32> = truth.pixels().iter().map(|p| f32::from(*p) / pair.scale).collect();
     let mut matcher = Matcher::new(settings.clone()).unwrap();
     let found = matcher.disparities(&left, &right, pair.disparities - 1).unwrap();

@@ -186,8 +186,7 @@ impl<'f> Patch<'f> {
 
     fn is_body(&self, x: i64, y: i64) -> bool {
         let Ok(depth) = self.frame.depth() else { return true };
-        let off = |z: f32| (f64::from(z) - self.depth_m).abs();
-        depth.get(x, y).is_some_and(|z| off(z) < BODY_DEPTH_M)
+        depth.get(x, y).is_some_and(|z| (f64::from(z) - self.depth_m).abs() < BODY_DEPTH_M)
     }
 
     fn colours(&self) -> Option<Histogram<COLOURS>> {
@@ -202,17 +201,16 @@ impl<'f> Patch<'f> {
     }
 
     fn edges(&self) -> Option<Histogram<EDGES>> {
-        fn slope(a: Option<f64>, b: Option<f64>) -> Option<f64> {
-            Some(0.5 * (b? - a?))
+        fn slope(a: Option<u8>, b: Option<u8>) -> Option<f64> {
+            Some(0.5 * (f64::from(b?) - f64::from(a?)))
         }
 
         let grey = self.frame.grey().ok()?;
         let mut histogram = [0.0; EDGES];
         let mut count = 0;
         for (x, y) in self.pixels() {
-            let at = |dx, dy| grey.get(x + dx, y + dy).map(f64::from);
-            let across = slope(at(-1, 0), at(1, 0)).unwrap_or(0.0);
-            let down = slope(at(0, -1), at(0, 1)).unwrap_or(0.0);
+            let across = slope(grey.get(x - 1, y), grey.get(x + 1, y)).unwrap_or(0.0);
+            let down = slope(grey.get(x, y - 1), grey.get(x, y + 1)).unwrap_or(0.0);
             histogram[edge(across, down)] += 1.0;
             count += 1;
         }
@@ -491,19 +489,25 @@ mod tests {
                     _ => 1.5,
                 })
             }
-            let looks = |metres| {
-                looks_of(
-                    &person(0.0),
-                    &frame(
-                        |x, _| if (155..165).contains(&x) { RED } else { GREEN },
-                        Some(depth(metres)),
-                    ),
-                )
-            };
-            assert!((share(&looks(2.0).torso, 0) - 1.0).abs() < 1e-9);
-            assert!(looks(2.4).torso.is_some() && looks(1.75).torso.is_some());
-            assert!(looks(2.45).torso.is_none() && looks(1.7).torso.is_none());
-            assert!(looks(f32::NAN).torso.is_none());
+
+            fn red_person(x: usize, _: usize) -> [u8; 3] {
+                if (155..165).contains(&x) { RED } else { GREEN }
+            }
+
+            for (metres, is_person) in [
+                (2.0, true),
+                (2.4, true),
+                (1.75, true),
+                (2.45, false),
+                (1.7, false),
+                (f32::NAN, false),
+            ] {
+                let torso = looks_of(&person(0.0), &frame(red_person, Some(depth(metres)))).torso;
+                assert_eq!(torso.is_some(), is_person, "{metres}");
+                if metres == 2.0 {
+                    assert!((share(&torso, 0) - 1.0).abs() < 1e-9);
+                }
+            }
         }
 
         #[test]

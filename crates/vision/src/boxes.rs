@@ -253,14 +253,13 @@ mod tests {
     fn the_box_that_is_tracked_depends_on_the_part_of_the_body() {
         let region = Rect::new(300.0, 100.0, 60.0, 200.0);
         let upper = region.upper_body_of_standing(1.7);
-        let found = |body| boxed(&of_body(body), &region, None).unwrap();
-        let full = found(BoxedBody::Full);
-        let whole = found(BoxedBody::FullBox);
+        let [full, whole, half] = [BoxedBody::Full, BoxedBody::FullBox, BoxedBody::Upper]
+            .map(|body| boxed(&of_body(body), &region, None).unwrap());
         assert_eq!(full.image, Some(ImageBox::upper_body(upper)));
         let image = whole.image.unwrap();
         assert_eq!((image.rect, image.extent), (region, Extent::FullBody));
         assert_eq!((full.position, full.covariance), (whole.position, whole.covariance));
-        assert_eq!(found(BoxedBody::Upper).rect(), Some(region));
+        assert_eq!(half.rect(), Some(region));
         let child = BoxSettings { height_m: 1.1, ..BoxSettings::default() };
         let nearer = boxed(&child, &region, None).unwrap();
         assert!(nearer.position.x < 0.7 * full.position.x, "{}", nearer.position);
@@ -316,18 +315,17 @@ mod tests {
             camera().upper_body(&Point3::new(3.0, 0.0, 1.5)),
         );
         let track = Track::new(TrackId(1), estimate, 2.0).with_age(3);
-        let near = |found: &[Detection]| -> Vec<f64> {
+        for (found, near) in [
+            // 0.8 m on the floor, whatever the height.
+            ([at(3.79, 0.0, 0.1), at(3.81, 0.0, 0.1), at(3.6, 0.6, 0.1)], vec![3.79]),
+            ([at(3.5, 0.0, 0.1), at(3.1, 0.0, 0.1), at(3.3, 0.0, 0.1)], vec![3.1, 3.3, 3.5]),
+            // A variance above a quarter of 0.8 is that of a guess, for which the box is enough.
+            ([at(4.0, 0.0, 0.44), at(4.0, 0.0, 0.45), at(4.0, 1.0, 0.45)], vec![4.0]),
+        ] {
             let found = BoxSettings::default().near(&track, found.to_vec());
-            found.iter().map(|detection| detection.position.x).collect()
-        };
-        // 0.8 m on the floor, whatever the height.
-        assert_eq!(near(&[at(3.79, 0.0, 0.1), at(3.81, 0.0, 0.1), at(3.6, 0.6, 0.1)]), [3.79]);
-        assert_eq!(
-            near(&[at(3.5, 0.0, 0.1), at(3.1, 0.0, 0.1), at(3.3, 0.0, 0.1)]),
-            [3.1, 3.3, 3.5]
-        );
-        // A variance above a quarter of 0.8 is that of a guess, for which the box is enough.
-        assert_eq!(near(&[at(4.0, 0.0, 0.44), at(4.0, 0.0, 0.45), at(4.0, 1.0, 0.45)]), [4.0]);
+            let found: Vec<f64> = found.iter().map(|detection| detection.position.x).collect();
+            assert_eq!(found, near);
+        }
     }
 
     #[test]

@@ -144,24 +144,27 @@ pub fn factor_of_depth(depth: &DepthImage, camera: &Camera) -> Option<f64> {
         return None;
     }
     ratios.sort_by(f64::total_cmp);
-    let within = |at: usize| {
-        let low = ratios[at] - ONE_FLOOR;
-        let high = ratios[at] + ONE_FLOOR;
-        ratios.partition_point(|v| *v <= high) - ratios.partition_point(|v| *v < low)
-    };
-    let most = (0..ratios.len()).step_by(4).map(within).max()?;
+    let most = ratios.iter().step_by(4).map(|ratio| count_near(&ratios, *ratio)).max()?;
     // The farthest of the frequent ones, because things on the floor are nearer than it.
-    let farthest = (0..ratios.len()).rev().find(|at| within(*at) * 10 >= most * 7)?;
-    let floor = ratios[farthest] - 0.5 * ONE_FLOOR;
+    let farthest =
+        *ratios.iter().rev().find(|ratio| count_near(&ratios, **ratio) * 10 >= most * 7)?;
+    let floor = farthest - 0.5 * ONE_FLOOR;
     let around = ratios.iter().filter(|ratio| (*ratio - floor).abs() <= 1.5 * ONE_FLOOR);
     let floor = tagalong_math::median(around.copied())?;
-    let is_seen = within(farthest) as f64 >= LEAST_FLOOR * ratios.len() as f64;
+    let is_seen = count_near(&ratios, farthest) as f64 >= LEAST_FLOOR * ratios.len() as f64;
     let below = ratios.len() - ratios.partition_point(|ratio| *ratio <= floor + 4.0 * ONE_FLOOR);
     let is_lowest = below as f64 <= MOST_BELOW * ratios.len() as f64;
     let factor = (is_seen && is_lowest).then(|| (-floor).exp())?;
     let is_other_tilt =
         !PLAUSIBLE_FACTORS.contains(&factor) && has_other_tilt(depth, camera, factor);
     (!is_other_tilt).then_some(factor)
+}
+
+/// Counts the sorted ratios that may be of one floor with this one.
+fn count_near(ratios: &[f64], ratio: f64) -> usize {
+    let low = ratio - ONE_FLOOR;
+    let high = ratio + ONE_FLOOR;
+    ratios.partition_point(|v| *v <= high) - ratios.partition_point(|v| *v < low)
 }
 
 /// Returns true if the floor in readings that are multiplied by a factor has another tilt than the mount
@@ -185,10 +188,13 @@ pub fn written_unit_m(measured_m: f64) -> f64 {
     let tens = [power, power + 1.0];
     let round = tens.iter().flat_map(|power| ROUND_UNITS.map(|digits| format!("{digits}e{power}")));
     let round = round.filter_map(|text| text.parse::<f64>().ok());
-    let off = |unit_m: &f64| (unit_m / measured_m - 1.0).abs();
-    let nearest =
-        round.min_by(|a, b| off(a).total_cmp(&off(b))).filter(|it| off(it) < UNIT_ACCURACY);
-    nearest.unwrap_or_else(|| format!("{measured_m:.1e}").parse().unwrap_or(measured_m))
+    let nearest = round
+        .map(|unit_m| ((unit_m / measured_m - 1.0).abs(), unit_m))
+        .min_by(|a, b| a.0.total_cmp(&b.0));
+    match nearest {
+        Some((off, unit_m)) if off < UNIT_ACCURACY => unit_m,
+        _ => format!("{measured_m:.1e}").parse().unwrap_or(measured_m),
+    }
 }
 
 /// Fits the floor to points of the camera frame (x right, y down, z forward). Returns `None` if no
@@ -254,14 +260,14 @@ fn score(plane: &Ground, points: &[Point3<f64>], settings: &GroundSettings) -> f
 
 /// Returns the least-squares plane through the inliers.
 fn refined(plane: &Ground, points: &[Point3<f64>], settings: &GroundSettings) -> Option<Ground> {
-    let inliers = || points.iter().filter(|p| is_inlier(plane, p, settings));
-    let count = inliers().count();
+    let inliers = points.iter().filter(|p| is_inlier(plane, p, settings));
+    let count = inliers.clone().count();
     if count < 3 {
         return None;
     }
-    let mean = inliers().map(|p| p.coords).sum::<Vector3<f64>>() / count as f64;
+    let mean = inliers.clone().map(|p| p.coords).sum::<Vector3<f64>>() / count as f64;
     let scatter: Matrix3<f64> =
-        inliers().map(|p| (p.coords - mean) * (p.coords - mean).transpose()).sum();
+        inliers.map(|p| (p.coords - mean) * (p.coords - mean).transpose()).sum();
     let eigen = scatter.symmetric_eigen();
     // The normal is the direction of the smallest scatter.
     let normal = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
@@ -337,14 +343,14 @@ mod tests {
         let camera = Camera::mounted(lens, 160, 120, 1.2, 0.4, 0.0);
         let depth = room(&camera);
         // Each n-th column has readings twice as far as they may be.
-        let with_holes = |every: usize| {
-            DepthImage::from_fn(160, 120, |x, y| {
+        let [few, many] = [80, 3].map(|every| {
+            let with_holes = DepthImage::from_fn(160, 120, |x, y| {
                 depth.row(y)[x] * if x % every == 0 { 2.0 } else { 1.0 }
-            })
-        };
-        let few = factor_of_depth(&with_holes(80), &camera).unwrap();
-        assert!((few - 1.0).abs() < 0.03, "{few}");
-        assert_eq!(factor_of_depth(&with_holes(3), &camera), None);
+            });
+            factor_of_depth(&with_holes, &camera)
+        });
+        assert!((few.unwrap() - 1.0).abs() < 0.03, "{few:?}");
+        assert_eq!(many, None);
     }
 
     #[test]
@@ -407,12 +413,13 @@ mod tests {
             let lens = Pinhole { fx: 130.0, fy: 130.0, cx: 79.5, cy: 59.5, distortion: Distortion::None };
             let camera = Camera::mounted(lens, 160, 120, height, pitch, roll);
             let depth = room(&camera);
-            let on_floor = |x: usize, y: usize| {
-                let at = camera.back_project(Point2::new(x as f64, y as f64), depth.row(y)[x].into());
-                at.z < 0.05
-            };
-            let floor = (0..120).flat_map(|y| (0..160).map(move |x| (x, y)));
-            let part = floor.filter(|(x, y)| on_floor(*x, *y)).count() as f64 / 19_200.0;
+            let mut on_floor = 0;
+            for (x, y) in (0..120).flat_map(|y| (0..160).map(move |x| (x, y))) {
+                let pixel = Point2::new(x as f64, y as f64);
+                let at = camera.back_project(pixel, depth.row(y)[x].into());
+                on_floor += usize::from(at.z < 0.05);
+            }
+            let part = on_floor as f64 / 19_200.0;
             // A strip of floor at the lower border is too small for a reliable fit.
             prop_assume!(part > 0.2);
             let found = ground_of_depth(&depth, &camera, &GroundSettings::default()).unwrap();
@@ -437,7 +444,8 @@ mod tests {
         let lens =
             Pinhole { fx: 130.0, fy: 130.0, cx: 79.5, cy: 59.5, distortion: Distortion::None };
         let camera = Camera::mounted(lens, 160, 120, 1.2, 0.3, 0.0);
-        let fit = || ground_of_depth(&room(&camera), &camera, &GroundSettings::default());
-        assert_eq!(fit(), fit());
+        let [first, second] =
+            [0, 1].map(|_| ground_of_depth(&room(&camera), &camera, &GroundSettings::default()));
+        assert_eq!(first, second);
     }
 }

@@ -57,17 +57,21 @@ impl Integral {
     /// Returns the sum over columns `left..right` and rows `top..bottom`, as far as they lie in the
     /// image.
     pub fn sum(&self, left: usize, top: usize, right: usize, bottom: usize) -> u32 {
-        let at =
-            |x: usize, y: usize| self.sums[y.min(self.height) * self.stride() + x.min(self.width)];
         if right <= left || bottom <= top {
             return 0;
         }
         // The intermediate differences may be negative; modulo 2³² the result is right all the
         // same.
-        at(right, bottom)
-            .wrapping_sub(at(left, bottom))
-            .wrapping_sub(at(right, top))
-            .wrapping_add(at(left, top))
+        self.sum_before(right, bottom)
+            .wrapping_sub(self.sum_before(left, bottom))
+            .wrapping_sub(self.sum_before(right, top))
+            .wrapping_add(self.sum_before(left, top))
+    }
+
+    /// Returns the sum above and to the left of a corner.
+    #[inline]
+    fn sum_before(&self, x: usize, y: usize) -> u32 {
+        self.sums[y.min(self.height) * self.stride() + x.min(self.width)]
     }
 }
 

@@ -52,8 +52,8 @@ mod tests {
     }
 
     fn bounds(points: &[[i64; 2]], axis: usize) -> (i64, i64) {
-        let along = || points.iter().map(|point| point[axis]);
-        (along().min().unwrap(), along().max().unwrap())
+        let along = points.iter().map(|point| point[axis]);
+        (along.clone().min().unwrap(), along.max().unwrap())
     }
 
     /// Returns true if an empty strip goes through all points, tested position by position.

@@ -40,15 +40,13 @@ impl Blend for [u8; 3] {
     #[inline]
     fn mean(four: [Self; 4]) -> Self {
         let [a, b, c, d] = four;
-        let one = |i: usize| u8::mean([a[i], b[i], c[i], d[i]]);
-        [one(0), one(1), one(2)]
+        std::array::from_fn(|i| u8::mean([a[i], b[i], c[i], d[i]]))
     }
 
     #[inline]
     fn bilinear(four: [Self; 4], across: u32, down: u32) -> Self {
         let [a, b, c, d] = four;
-        let one = |i: usize| u8::bilinear([a[i], b[i], c[i], d[i]], across, down);
-        [one(0), one(1), one(2)]
+        std::array::from_fn(|i| u8::bilinear([a[i], b[i], c[i], d[i]], across, down))
     }
 }
 
@@ -131,10 +129,10 @@ impl<P: Blend> Unwrapper<P> {
         let wanted: Vec<usize> = (0..panorama.rows).map(|row| coarseness(panorama, row)).collect();
         let levels = pyramid(width, height, wanted.iter().copied().max().unwrap_or(0));
         let rows: Vec<usize> = wanted.into_iter().map(|w| w.min(levels.len() - 1)).collect();
-        let tap = |row: usize, column: usize| tap(panorama, &levels, rows[row], column, row);
         let places =
             (0..panorama.rows).flat_map(|row| (0..panorama.columns).map(move |c| (row, c)));
-        let taps = places.map(|(row, column)| tap(row, column)).collect();
+        let taps =
+            places.map(|(row, column)| tap(panorama, &levels, rows[row], column, row)).collect();
         let halved = vec![P::default(); levels[1..].iter().map(Level::len).sum()];
         Ok(Self { columns: panorama.columns, levels, rows, taps, halved })
     }
@@ -234,10 +232,11 @@ fn halve_row<P: Blend>((upper, lower): (&[P], &[P]), to: &mut [P]) {
 /// Returns the number of halvings that keep the raw image as fine as a row: by the geometric mean
 /// of the raw pixels per column and per row of the panorama.
 fn coarseness(panorama: &Panorama, row: usize) -> usize {
-    let radius = |row: f64| panorama.mirror.radius_px(panorama.elevation(row));
     let row = row as f64;
-    let across = TAU * radius(row) / panorama.columns as f64;
-    let down = (radius(row - 0.5) - radius(row + 0.5)).abs();
+    let [above, own, below] =
+        [row - 0.5, row, row + 0.5].map(|row| panorama.mirror.radius_px(panorama.elevation(row)));
+    let across = TAU * own / panorama.columns as f64;
+    let down = (above - below).abs();
     (across * down).sqrt().max(1.0).log2() as usize
 }
 
@@ -261,9 +260,8 @@ fn tap(panorama: &Panorama, levels: &[Level], level: usize, column: usize, row: 
     let raw = panorama.raw_pixel(column as f64, row as f64);
     // Pixel centres have whole coordinates on every level.
     let scale = f64::from(1u32 << level);
-    let on_level = |place: f64| (place + 0.5) / scale - 0.5;
-    let (x, across) = Level::split(on_level(raw.x), width);
-    let (y, down) = Level::split(on_level(raw.y), height);
+    let (x, across) = Level::split((raw.x + 0.5) / scale - 0.5, width);
+    let (y, down) = Level::split((raw.y + 0.5) / scale - 0.5, height);
     Tap { at: (y * width + x) as u32, across, down }
 }
 
@@ -300,10 +298,10 @@ mod tests {
     fn slowly(raw: &GreyImage, panorama: &Panorama, column: usize, row: usize) -> f64 {
         let level = coarseness(panorama, row);
         let scale = f64::from(1u32 << level);
-        let side = |size: usize| (size >> level) as f64 - 1.0;
+        let [last_x, last_y] = [raw.width(), raw.height()].map(|size| (size >> level) as f64 - 1.0);
         let place = panorama.raw_pixel(column as f64, row as f64);
-        let x = ((place.x + 0.5) / scale - 0.5).clamp(0.0, side(raw.width()));
-        let y = ((place.y + 0.5) / scale - 0.5).clamp(0.0, side(raw.height()));
+        let x = ((place.x + 0.5) / scale - 0.5).clamp(0.0, last_x);
+        let y = ((place.y + 0.5) / scale - 0.5).clamp(0.0, last_y);
         let cx = x.floor();
         let cy = y.floor();
         let mut sum = 0.0;

@@ -66,10 +66,11 @@ impl Exposure {
     pub fn of(grey: &GreyImage) -> Self {
         let pixels = grey.pixels();
         let count = pixels.len().max(1) as f64;
-        let part = |is: fn(&u8) -> bool| pixels.iter().filter(|v| is(v)).count() as f64 / count;
+        let black = pixels.iter().filter(|v| **v < BLACK).count() as f64 / count;
+        let white = pixels.iter().filter(|v| **v >= WHITE).count() as f64 / count;
         let mean = pixels.iter().map(|v| f64::from(*v)).sum::<f64>() / count;
         let spread = pixels.iter().map(|v| (f64::from(*v) - mean).powi(2)).sum::<f64>() / count;
-        Self { black: part(|v| *v < BLACK), white: part(|v| *v >= WHITE), contrast: spread.sqrt() }
+        Self { black, white, contrast: spread.sqrt() }
     }
 }
 

@@ -112,11 +112,13 @@ impl EdgeOverlap {
     /// parts.
     fn without(&self, left_out: Option<usize>) -> Vec<f64> {
         let side = 2 * self.settings.reach_px + 1;
-        let kept = || self.parts.iter().enumerate().filter(|(i, _)| Some(*i) != left_out);
-        let count = kept().map(|(_, (_, count))| count).sum::<u64>().max(1) as f64;
-        let sum = |i: usize| kept().map(|(_, (sums, _))| sums[i]).sum::<u64>() as f64 / count;
-        let sums: Vec<f64> = (0..side * side).map(sum).collect();
-        smoothed(&sums, side)
+        let kept = self.parts.iter().enumerate().filter(|(i, _)| Some(*i) != left_out);
+        let count = kept.clone().map(|(_, (_, count))| count).sum::<u64>().max(1) as f64;
+        let mut means = Vec::with_capacity(side * side);
+        for i in 0..side * side {
+            means.push(kept.clone().map(|(_, (sums, _))| sums[i]).sum::<u64>() as f64 / count);
+        }
+        smoothed(&means, side)
     }
 
     fn peak(&self, scores: &[f64]) -> Option<usize> {
@@ -142,12 +144,15 @@ fn jackknife(values: impl Iterator<Item = f64> + Clone) -> f64 {
 
 /// Returns the mean over three by three offsets, so that a jagged peak does not decide.
 fn smoothed(scores: &[f64], side: usize) -> Vec<f64> {
-    let near = |at: usize| at.saturating_sub(1)..(at + 2).min(side);
-    let mean = |x: usize, y: usize| {
-        let around = near(y).flat_map(|row| near(x).map(move |column| scores[row * side + column]));
-        around.clone().sum::<f64>() / around.count() as f64
-    };
-    (0..side).flat_map(|y| (0..side).map(move |x| (x, y))).map(|(x, y)| mean(x, y)).collect()
+    let mut means = Vec::with_capacity(side * side);
+    for y in 0..side {
+        for x in 0..side {
+            let [columns, rows] = [x, y].map(|at| at.saturating_sub(1)..(at + 2).min(side));
+            let around = rows.flat_map(|y| columns.clone().map(move |x| scores[y * side + x]));
+            means.push(around.clone().sum::<f64>() / around.count() as f64);
+        }
+    }
+    means
 }
 
 /// Changes of intensity from column to column and from row to row.
@@ -166,27 +171,28 @@ impl Changes {
 
         let width = grey.width();
         let height = grey.height();
-        let at = |x: usize, y: usize| grey.row(y)[x];
-        let change = |a: u8, b: u8| a.abs_diff(b).min(ceiling);
-        let pixels = || (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
-        Self {
-            width,
-            height,
-            along_row: pixels()
-                .map(|(x, y)| change(at(x.saturating_sub(1), y), at(next(x, width), y)))
-                .collect(),
-            along_column: pixels()
-                .map(|(x, y)| change(at(x, y.saturating_sub(1)), at(x, next(y, height))))
-                .collect(),
+        let mut along_row = Vec::with_capacity(width * height);
+        let mut along_column = Vec::with_capacity(width * height);
+        for y in 0..height {
+            let row = grey.row(y);
+            let above = grey.row(y.saturating_sub(1));
+            let below = grey.row(next(y, height));
+            for x in 0..width {
+                let across = row[x.saturating_sub(1)].abs_diff(row[next(x, width)]);
+                along_row.push(across.min(ceiling));
+                along_column.push(above[x].abs_diff(below[x]).min(ceiling));
+            }
         }
+        Self { width, height, along_row, along_column }
     }
 
     /// Adds the changes at all offsets of an outline pixel that stays inside the image at all of
     /// them.
     fn collect(&self, (x, y, down): Outline, reach: usize, (sums, count): &mut (Vec<u64>, u64)) {
         // Otherwise the offsets would be means over different outlines.
-        let inside = |at: usize, size: usize| at >= reach && at + reach < size;
-        if !(inside(x, self.width) && inside(y, self.height)) {
+        let columns = reach..self.width.saturating_sub(reach);
+        let rows = reach..self.height.saturating_sub(reach);
+        if !(columns.contains(&x) && rows.contains(&y)) {
             return;
         }
         let changes = if down { &self.along_column } else { &self.along_row };
@@ -248,22 +254,25 @@ mod tests {
     /// Renders a dark board and a bright one in front of a textured wall, with depth shifted by an
     /// offset.
     fn scene(offset: [i64; 2], boards: &[(i64, i64, i64)]) -> (GreyImage, DepthImage) {
-        let board = |x: i64, y: i64| {
-            boards.iter().position(|(left, top, side)| {
-                (*left..left + side).contains(&x) && (*top..top + side + 10).contains(&y)
-            })
-        };
-        let grey = GreyImage::from_fn(160, 120, |x, y| match board(x as i64, y as i64) {
-            Some(which) => [30, 220, 60][which % 3],
-            None => 120 + ((x * 7 + y * 13) % 11) as u8,
-        });
+        let grey =
+            GreyImage::from_fn(160, 120, |x, y| match board_at(boards, x as i64, y as i64) {
+                Some(which) => [30, 220, 60][which % 3],
+                None => 120 + ((x * 7 + y * 13) % 11) as u8,
+            });
         let depth = DepthImage::from_fn(160, 120, |x, y| {
-            match board(x as i64 - offset[0], y as i64 - offset[1]) {
+            match board_at(boards, x as i64 - offset[0], y as i64 - offset[1]) {
                 Some(which) => 1.5 + 0.5 * which as f32,
                 None => 4.0,
             }
         });
         (grey, depth)
+    }
+
+    /// Returns the index of the board that a pixel shows.
+    fn board_at(boards: &[(i64, i64, i64)], x: i64, y: i64) -> Option<usize> {
+        boards.iter().position(|(left, top, side)| {
+            (*left..left + side).contains(&x) && (*top..top + side + 10).contains(&y)
+        })
     }
 
     proptest! {
@@ -284,18 +293,21 @@ mod tests {
     fn slowly(grey: &GreyImage, depth: &DepthImage, dx: i64, dy: i64) -> u64 {
         let settings = OverlapSettings::default();
         let reach = settings.reach_px as i64;
-        let within =
-            |x: i64, y: i64| x >= reach && y >= reach && x < 160 - reach && y < 120 - reach;
-        let kept = outlines(depth, &settings).into_iter();
-        let kept = kept.filter(|(x, y, _)| within(*x as i64, *y as i64));
-        kept.map(|(x, y, down)| {
-            let x = x as i64 + dx;
-            let y = y as i64 + dy;
+        let mut sum = 0;
+        for (x, y, down) in outlines(depth, &settings) {
+            let x = x as i64;
+            let y = y as i64;
+            if !((reach..160 - reach).contains(&x) && (reach..120 - reach).contains(&y)) {
+                continue;
+            }
             let (sx, sy) = if down { (0, 1) } else { (1, 0) };
-            let at = |x: i64, y: i64| grey.get(x.clamp(0, 159), y.clamp(0, 119)).unwrap();
-            u64::from(at(x - sx, y - sy).abs_diff(at(x + sx, y + sy)).min(settings.ceiling))
-        })
-        .sum()
+            let [before, after] = [-1, 1].map(|side| {
+                let x = (x + dx + side * sx).clamp(0, 159);
+                grey.get(x, (y + dy + side * sy).clamp(0, 119)).unwrap()
+            });
+            sum += u64::from(before.abs_diff(after).min(settings.ceiling));
+        }
+        sum
     }
 
     #[test]

@@ -51,19 +51,17 @@ impl Upright {
         let ahead = (head.coords.xy() - eye).try_normalize(1e-9)?;
         let half_m = 0.5 * (Self::COLUMNS - 1) as f64 * Self::STEP_M;
         let right = Vector2::new(ahead.y, -ahead.x) * half_m;
-        let end = |row: usize, side: f64| {
-            let floor = head.coords.xy() + right * side;
-            let place = Point3::new(floor.x, floor.y, Self::TOP_M - Self::STEP_M * row as f64);
-            let ahead_m = camera.robot_from_camera.inverse_transform_point(&place).z;
-            Some(End { pixel: camera.project(&place)?, ahead_m })
-        };
         let nowhere = End { pixel: Point2::origin(), ahead_m: 0.0 };
         let mut rows = [[nowhere; 2]; Self::ROWS];
         for (row, ends) in rows.iter_mut().enumerate() {
-            let [left, mut right] = [end(row, -1.0)?, end(row, 1.0)?];
+            for (end, side) in ends.iter_mut().zip([-1.0, 1.0]) {
+                let floor = head.coords.xy() + right * side;
+                let place = Point3::new(floor.x, floor.y, Self::TOP_M - Self::STEP_M * row as f64);
+                end.ahead_m = camera.robot_from_camera.inverse_transform_point(&place).z;
+                end.pixel = camera.project(&place)?;
+            }
             // In a panorama the seam may lie between the two ends.
-            right.pixel.x = camera.column_near(right.pixel.x, left.pixel.x);
-            *ends = [left, right];
+            ends[1].pixel.x = camera.column_near(ends[1].pixel.x, ends[0].pixel.x);
         }
         Some(Self { rows, is_around: camera.panorama().is_some() })
     }
@@ -96,18 +94,19 @@ impl Upright {
         depth: &'a DepthImage,
         every: usize,
     ) -> impl Iterator<Item = Option<f32>> + 'a {
-        let width = depth.width();
-        let height = depth.height();
-        let reading = move |End { pixel, ahead_m }: End| {
-            let (x, has_column) = self.column(pixel.x, width);
-            let (y, has_row) = nearest(pixel.y, height);
-            let reading = if has_column && has_row { depth.row(y)[x] } else { f32::NAN };
-            (reading.is_finite() && reading > 0.0).then_some(reading - ahead_m as f32)
-        };
         let columns = (0..Self::COLUMNS).step_by(every);
-        self.lines()
-            .step_by(every)
-            .flat_map(move |line| columns.clone().map(move |column| reading(line.at(column))))
+        self.lines().step_by(every).flat_map(move |line| {
+            columns.clone().map(move |column| self.reading_behind(depth, line.at(column)))
+        })
+    }
+
+    /// Returns how far the reading at a cell lies behind the plane, m.
+    #[inline]
+    fn reading_behind(&self, depth: &DepthImage, End { pixel, ahead_m }: End) -> Option<f32> {
+        let (x, has_column) = self.column(pixel.x, depth.width());
+        let (y, has_row) = nearest(pixel.y, depth.height());
+        let reading = if has_column && has_row { depth.row(y)[x] } else { f32::NAN };
+        (reading.is_finite() && reading > 0.0).then_some(reading - ahead_m as f32)
     }
 
     /// Returns the column of a place, and true if it lies inside the image.
@@ -206,14 +205,14 @@ mod tests {
             let head = Point3::new(2.0 * bearing.cos(), 2.0 * bearing.sin(), 1.6);
             let shown = Upright::new(&camera, &head).unwrap().grey(&image).unwrap();
             let aside = Vector2::new(bearing.sin(), -bearing.cos());
-            let column = |cell: usize| {
+            let columns: [f64; 36] = std::array::from_fn(|cell| {
                 let m = (cell as f64 - 17.5) * Upright::STEP_M;
                 let place = Point3::new(head.x + m * aside.x, head.y + m * aside.y, 1.0);
                 camera.project(&place).unwrap().x.rem_euclid(480.0)
-            };
-            across += usize::from((column(0) - column(35)).abs() > 240.0);
+            });
+            across += usize::from((columns[0] - columns[35]).abs() > 240.0);
             for cell in (0..36).step_by(5) {
-                let wanted = (column(cell) - 240.0).abs();
+                let wanted = (columns[cell] - 240.0).abs();
                 let off = f64::from(shown.grey[40 * Upright::COLUMNS + cell]) - wanted;
                 assert!(off.abs() <= 1.5, "{bearing} {cell}: {off}");
                 assert!(shown.is_seen[40 * Upright::COLUMNS + cell]);
@@ -248,16 +247,20 @@ mod tests {
         }
 
         let depth = DepthImage::from_fn(320, 320, |x, _| wall(x));
-        let plane = Upright::new(&camera(), &Point3::new(3.0, 0.0, 1.6)).unwrap();
-        let of = |plane: &Upright, row: usize, column: usize| {
+        for (x, row, column, behind_m) in [
+            (3.0, 40, 4, Some(0.5)),
+            (3.0, 40, 30, None),
+            // Feet are below the image.
+            (1.0, 78, 4, None),
+        ] {
+            let plane = Upright::new(&camera(), &Point3::new(x, 0.0, 1.6)).unwrap();
             let half = plane.behind_m(&depth, 2).nth(row / 2 * 18 + column / 2);
             let cell = plane.behind_m(&depth, 1).nth(row * 36 + column);
             assert_eq!(half, cell, "every second cell of every second row");
-            half.flatten()
-        };
-        assert!((of(&plane, 40, 4).unwrap() - 0.5).abs() < 1e-6);
-        assert_eq!(of(&plane, 40, 30), None);
-        let near = Upright::new(&camera(), &Point3::new(1.0, 0.0, 1.6)).unwrap();
-        assert_eq!(of(&near, 78, 4), None, "feet are below the image");
+            let found = half.flatten();
+            assert_eq!(found.is_some(), behind_m.is_some(), "{x} {row} {column}");
+            let off = found.zip(behind_m).map_or(0.0, |(found, wanted): (f32, f32)| found - wanted);
+            assert!(off.abs() < 1e-6, "{off}");
+        }
     }
 }

@@ -172,29 +172,37 @@ fn add_errors(fate: &mut Fate, trial: &Trial, run: &Run) {
 }
 
 fn cells(ours: &[Vec<Fate>], empty: &[Vec<Fate>], at: usize) -> Vec<Cell> {
-    let kept = |draws: &[Vec<Fate>]| {
+    let [kept, kept_empty] = [ours, empty].map(|draws| {
         let trials = draws.iter().filter(|draw| draw[at].is_trial).count();
         let kept = draws.iter().filter(|draw| draw[at].is_kept).count();
         Cell::share(kept as u64, trials as u64, 1)
-    };
-    let of = || empty.iter().map(|draw| &draw[at]);
-    let count = |is: fn(&Fate) -> bool| Cell::number(of().filter(|f| is(f)).count() as f64, 0);
-    let mean_of =
-        |values: fn(&Fate) -> &Vec<f64>| mean(&of().flat_map(values).copied().collect::<Vec<_>>());
-    let mut after: Vec<f64> = of().filter_map(|fate| fate.after_s).collect();
+    });
+    let fates: Vec<&Fate> = empty.iter().map(|draw| &draw[at]).collect();
+    let mut after: Vec<f64> = fates.iter().filter_map(|fate| fate.after_s).collect();
     after.sort_by(f64::total_cmp);
     let median = after.get(after.len() / 2).copied().unwrap_or(f64::NAN);
     vec![
-        kept(ours),
-        kept(empty),
-        Cell::number(mean_of(|fate| &fate.pixels), 2),
-        count(|fate| fate.has_ended),
-        count(|fate| fate.near_astray),
-        count(|fate| fate.far_astray),
+        kept,
+        kept_empty,
+        mean_cell(&fates, |fate| &fate.pixels, 2),
+        count_cell(&fates, |fate| fate.has_ended),
+        count_cell(&fates, |fate| fate.near_astray),
+        count_cell(&fates, |fate| fate.far_astray),
         Cell::number(median, 1),
-        Cell::number(mean_of(|fate| &fate.ahead_m), 3),
-        Cell::number(mean_of(|fate| &fate.beyond_m), 3),
+        mean_cell(&fates, |fate| &fate.ahead_m, 3),
+        mean_cell(&fates, |fate| &fate.beyond_m, 3),
     ]
+}
+
+/// Counts the fates of which something is true.
+fn count_cell(fates: &[&Fate], is_so: fn(&Fate) -> bool) -> Cell {
+    Cell::number(fates.iter().filter(|fate| is_so(fate)).count() as f64, 0)
+}
+
+/// Returns the mean of all values of all fates.
+fn mean_cell(fates: &[&Fate], values: fn(&Fate) -> &Vec<f64>, digits: usize) -> Cell {
+    let all: Vec<f64> = fates.iter().flat_map(|fate| values(fate)).copied().collect();
+    Cell::number(mean(&all), digits)
 }
 
 /// Values that are tried with one window for all scenes.

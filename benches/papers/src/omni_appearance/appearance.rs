@@ -242,7 +242,13 @@ fn correlations(rooms: &[Room]) -> Result<Table, ReproduceError> {
         let [training, test] = Split::Place.divide(room.of(Eye::Ours), 0);
         parts.extend(fitted(&training, 0)?.map(|head| (head, test)));
     }
-    let row = |name: &str, value: &dyn Fn(&Head, &Sample) -> f64| {
+    let values: [(&str, fn(&Head, &Sample) -> f64); 4] = [
+        ("feature 1, width", |_, s| s.features.width),
+        ("feature 2, lower edge", |_, s| s.features.bottom),
+        ("feature 3, pixels", |_, s| s.features.pixels),
+        ("network 3-4-1", |head, s| s.distance(head, Distance::Network)),
+    ];
+    let rows = values.map(|(name, value)| {
         let mut plain = Vec::new();
         let mut ranked = Vec::new();
         for (head, test) in &parts {
@@ -252,16 +258,11 @@ fn correlations(rooms: &[Room]) -> Result<Table, ReproduceError> {
             ranked.push(vec![pearson(&ranks(&values), &ranks(&truth))]);
         }
         Row::ours(name, vec![cell(&plain), cell(&ranked)])
-    };
+    });
     Ok(Table {
         title: "Correlation with the true distance (P5, Fig. 5)".into(),
         columns: ["Pearson", "Spearman"].map(String::from).to_vec(),
-        rows: vec![
-            row("feature 1, width", &|_, s| s.features.width),
-            row("feature 2, lower edge", &|_, s| s.features.bottom),
-            row("feature 3, pixels", &|_, s| s.features.pixels),
-            row("network 3-4-1", &|head, s| s.distance(head, Distance::Network)),
-        ],
+        rows: rows.into(),
         notes: vec![
             "Means over rooms, of the test samples of one split by place each; the paper's values \
              are lost."
@@ -295,22 +296,22 @@ fn ranks(values: &[f64]) -> Vec<f64> {
 }
 
 fn bearings(rooms: &[Room]) -> Table {
-    let row = |name: &str, eye: Eye| {
+    let published = Cell { deviation: Some(1.60), ..Cell::number(2.01, 2) };
+    let mut rows = vec![Row::published("mean of the column histogram", vec![published])];
+    for (name, eye) in [
+        ("as printed, where it is within 7 degrees", Eye::Printed),
+        ("circular mean, shadows left out", Eye::Ours),
+    ] {
         let draws: Vec<Vec<f64>> = rooms
             .iter()
             .map(|room| room.of(eye).iter().map(|s| s.bearing_error_rad().to_degrees()).collect())
             .collect();
-        Row::ours(name, vec![over_draws(&draws, 2)])
-    };
-    let published = Cell { deviation: Some(1.60), ..Cell::number(2.01, 2) };
+        rows.push(Row::ours(name, vec![over_draws(&draws, 2)]));
+    }
     Table {
         title: "Error of the bearing, degrees (P5, section 4.2)".into(),
         columns: vec!["mean".into()],
-        rows: vec![
-            Row::published("mean of the column histogram", vec![published]),
-            row("as printed, where it is within 7 degrees", Eye::Printed),
-            row("circular mean, shadows left out", Eye::Ours),
-        ],
+        rows,
         notes: vec![
             "The mount is off by up to 0.4 degrees about each axis, the centre of the mirror by \
              a third of a pixel, and the detector does not know. What is farther off than 7 \
@@ -536,9 +537,9 @@ mod tests {
         let shown = [samples[3], samples[100], stranger];
         let found = switched(&shown, &general, &people, &mut counts);
         assert_eq!((counts.images, counts.told, counts.right), (3, 2, 2));
-        let by = |head: &Head, at: usize| errors(&shown[at..=at], head, Distance::Network)[0];
-        let heads = [&people[0].head, &people[1].head, &general];
-        assert_eq!(found, [by(heads[0], 0), by(heads[1], 1), by(heads[2], 2)]);
+        let heads = [(0, &people[0].head), (1, &people[1].head), (2, &general)];
+        let wanted = heads.map(|(at, head)| errors(&shown[at..=at], head, Distance::Network)[0]);
+        assert_eq!(found, wanted);
     }
 
     /// The model of the printed method is fitted to the features of the printed method.

@@ -79,27 +79,28 @@ struct Walk {
 
 pub(super) fn kalman(lab: &Lab) -> Result<Findings, ReproduceError> {
     let scenes = rooms(lab)?;
-    let contender = |name: &str, text: String| Contender {
-        folder: lab.printed_configs.clone(),
-        ..Contender::new(name, text)
-    };
     let mut contenders = Vec::new();
     for (_, distance) in DISTANCES {
         let detector = format!("distance = \"{distance}\"");
-        contenders.extend(
-            FILTERS.iter().map(|(name, filter)| contender(name, config(&detector, filter))),
-        );
+        for (name, filter) in FILTERS {
+            contenders.push(printed_contender(lab, name, config(&detector, filter)));
+        }
     }
     contenders.push(lab.contender(PRINTED)?);
-    contenders.extend(
-        STEPS.iter().map(|(name, detector, filter)| contender(name, config(detector, filter))),
-    );
+    for (name, detector, filter) in STEPS {
+        contenders.push(printed_contender(lab, name, config(detector, filter)));
+    }
     contenders.extend(lab.contenders(&BEYOND)?);
     let walks = lab.trials("walking about rooms", &scenes, &contenders, walk)?;
     let tables = DISTANCES.iter().enumerate();
     let tables = tables.map(|(at, (title, _))| filters(title, at * FILTERS.len(), &walks));
     let tables = tables.chain([steps(&walks)]).collect();
     Ok(Findings { tables, pictures: Vec::new() })
+}
+
+/// Returns the contender of a configuration that may name files of the printed ones.
+fn printed_contender(lab: &Lab, name: &str, text: String) -> Contender {
+    Contender { folder: lab.printed_configs.clone(), ..Contender::new(name, text) }
 }
 
 /// Returns the scenes of section 6.2: rooms with two people, one after the other.
@@ -147,15 +148,14 @@ fn walk(trial: Trial) -> Result<Walk, TrialError> {
     };
     for (at, moment) in trial.moments.iter().enumerate() {
         let Some(truth) = the_person(moment) else { continue };
-        let error = |run: &Run| error_m(run, at, truth);
         let (of_filters, of_steps) = trial.runs.split_at(filters);
         // Filters are compared on the images in which all of them have an estimate.
-        let all: Option<Vec<f64>> = of_filters.iter().map(error).collect();
+        let all: Option<Vec<f64>> = of_filters.iter().map(|run| error_m(run, at, truth)).collect();
         for (errors, error) in walk.of_filters.iter_mut().zip(all.into_iter().flatten()) {
             errors.push(error);
         }
         for (errors, run) in walk.of_steps.iter_mut().zip(of_steps) {
-            errors.extend(error(run));
+            errors.extend(error_m(run, at, truth));
         }
         walk.images += 1;
     }
@@ -173,20 +173,20 @@ fn filters(title: &str, first: usize, walks: &[Walk]) -> Table {
         Row::published("appearance model", with_empty(published(0.154, 0.094))),
         Row::published("with Kalman filter", with_empty(published(0.145, 0.092))),
     ];
-    let draws = |at: usize| -> Vec<Vec<f64>> {
-        walks.iter().map(|walk| walk.of_filters[first + at].clone()).collect()
-    };
+    let of_first: Vec<Vec<f64>> = walks.iter().map(|walk| walk.of_filters[first].clone()).collect();
     for (at, (name, _)) in FILTERS.iter().enumerate() {
-        let error = over_draws(&draws(at), 3).within(0.0, f64::INFINITY);
+        let draws: Vec<Vec<f64>> =
+            walks.iter().map(|walk| walk.of_filters[first + at].clone()).collect();
+        let error = over_draws(&draws, 3).within(0.0, f64::INFINITY);
         if at == 0 {
             rows.push(Row::ours(*name, with_empty(error)));
             continue;
         }
-        let gain = difference(&draws(0), &draws(at), 3);
-        let [unpaired, paired] = p_values(&draws(0), &draws(at));
+        let gain = difference(&of_first, &draws, 3);
+        let [unpaired, paired] = p_values(&of_first, &draws);
         rows.push(Row::ours(*name, vec![error, gain, unpaired, paired]));
     }
-    let images = draws(0).concat().len();
+    let images = of_first.concat().len();
     Table {
         title: format!("Error of the position with the {title}, m (P5, section 6.2)"),
         columns: COLUMNS.map(String::from).to_vec(),
@@ -195,7 +195,7 @@ fn filters(title: &str, first: usize, walks: &[Walk]) -> Table {
             format!(
                 "{images} images of two people in each of {} rooms; the shipped model, fitted to \
                  others in other rooms",
-                means(&draws(0)).len()
+                means(&of_first).len()
             ),
             "Intervals are over rooms, differences paired by room: neighbouring images are not \
              independent, as the paper's t-test takes them to be."
@@ -219,28 +219,29 @@ fn with_empty(error: Cell) -> Vec<Cell> {
 /// Builds the table from the printed method to the corrected one, step by step.
 fn steps(walks: &[Walk]) -> Table {
     let names = std::iter::once("as printed").chain(STEPS.map(|(name, ..)| name)).chain(BEYOND);
-    let draws = |at: usize| -> Vec<Vec<f64>> {
-        walks.iter().map(|walk| walk.of_steps[at].clone()).collect()
-    };
-    let row = |(at, name): (usize, &str)| {
+    let mut rows = Vec::new();
+    let mut before: Option<Vec<Vec<f64>>> = None;
+    for (at, name) in names.enumerate() {
         let found = walks.iter().map(|walk| {
             let near = walk.of_steps[at].iter().filter(|error| **error < FOUND_M).count();
             vec![100.0 * near as f64 / walk.images.max(1) as f64]
         });
         let found: Vec<Vec<f64>> = found.collect();
+        let draws: Vec<Vec<f64>> = walks.iter().map(|walk| walk.of_steps[at].clone()).collect();
         let cells = vec![
             Cell { deviation: None, ..over_draws(&found, 1) }.within(0.0, 100.0),
-            over_draws(&draws(at), 3).within(0.0, f64::INFINITY),
-            if at == 0 { Cell::default() } else { difference(&draws(at - 1), &draws(at), 3) },
+            over_draws(&draws, 3).within(0.0, f64::INFINITY),
+            before.map_or_else(Cell::default, |before| difference(&before, &draws, 3)),
         ];
-        Row::ours(name, cells)
-    };
+        rows.push(Row::ours(name, cells));
+        before = Some(draws);
+    }
     Table {
         title: "From the printed method to ours, a step a row (P5, sections 4 to 6)".into(),
         columns: ["found, %", "error of the position, m", "difference to the row above"]
             .map(String::from)
             .to_vec(),
-        rows: names.enumerate().map(row).collect(),
+        rows,
         notes: vec![
             format!(
                 "The images of the tables above; found is whose position is within {FOUND_M} m, \
@@ -278,15 +279,14 @@ mod tests {
     #[test]
     fn the_first_step_is_one_plugin_away_from_the_printed_config() {
         let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs");
-        let whole = |text: &str| flattened(text, &configs).unwrap().parse().unwrap();
         let printed = include_str!("../../configs/omni-appearance-as-printed.toml");
-        let mut printed: toml::Table = whole(printed);
-        let mut first: toml::Table = whole(&config(SEAMLESS, PRINTED_U));
-        for table in [&mut printed, &mut first] {
+        let tables = [printed, &config(SEAMLESS, PRINTED_U)].map(|text| {
+            let mut table: toml::Table = flattened(text, &configs).unwrap().parse().unwrap();
             let detector = table["detectors"][0].as_table_mut().unwrap();
             detector.remove("roles");
             detector.remove("plugin");
-        }
-        assert_eq!(printed, first);
+            table
+        });
+        assert_eq!(tables[0], tables[1]);
     }
 }

@@ -68,12 +68,11 @@ fn table(title: &str, trials: &[Vec<PipelineResult>]) -> Table {
     let columns = ["IDF1, %", "MOTA, %", "renamed", "position error, m"];
     let rows = PIPELINES.iter().enumerate().map(|(at, name)| {
         let tallies: Vec<&Tally> = trials.iter().map(|done| &done[at].tally).collect();
-        let share = |of, least| pooled(&tallies, 3, of).within(least, 1.0).percent();
         let swaps = Cell::number(Tally::combine(tallies.iter().copied()).scores().idsw as f64, 0);
         let errors: Vec<Vec<f64>> = trials.iter().map(|done| done[at].errors_m.clone()).collect();
         let cells = vec![
-            share(|s| s.idf1, 0.0),
-            share(|s| s.mota, f64::NEG_INFINITY),
+            pooled(&tallies, 3, |s| s.idf1).within(0.0, 1.0).percent(),
+            pooled(&tallies, 3, |s| s.mota).within(f64::NEG_INFINITY, 1.0).percent(),
             swaps,
             over_draws(&errors, 3).within(0.0, f64::INFINITY),
         ];

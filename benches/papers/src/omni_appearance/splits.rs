@@ -83,32 +83,31 @@ mod tests {
 
     /// Samples of two people that go round the robot, one after the other.
     fn samples() -> Vec<Sample> {
-        let sample = |frame: u64| Sample {
-            features: Features {
-                width: 9.0,
-                bottom: 9.0,
-                pixels: 99.0,
-                top: 9.0,
-                middle: 9.0,
-                core: 9.0,
-                low: 9.0,
-            },
-            floor_m: 2.0,
-            looks: [0.0; 4],
-            distance_m: 2.0,
-            bearing_rad: 0.0,
-            true_bearing_rad: 0.07 * frame as f64 - PI * (frame as f64 * 0.07 / PI).floor() * 2.0,
-            person: frame / 120,
-            frame,
+        let features = Features {
+            width: 9.0,
+            bottom: 9.0,
+            pixels: 99.0,
+            top: 9.0,
+            middle: 9.0,
+            core: 9.0,
+            low: 9.0,
         };
-        (0..240)
-            .map(sample)
-            .map(|mut sample| {
-                let (sine, cosine) = sample.true_bearing_rad.sin_cos();
-                sample.true_bearing_rad = sine.atan2(cosine);
-                sample
-            })
-            .collect()
+        let mut samples = Vec::new();
+        for frame in 0..240 {
+            let bearing_rad = 0.07 * frame as f64 - PI * (frame as f64 * 0.07 / PI).floor() * 2.0;
+            let (sine, cosine) = bearing_rad.sin_cos();
+            samples.push(Sample {
+                features,
+                floor_m: 2.0,
+                looks: [0.0; 4],
+                distance_m: 2.0,
+                bearing_rad: 0.0,
+                true_bearing_rad: sine.atan2(cosine),
+                person: frame / 120,
+                frame,
+            });
+        }
+        samples
     }
 
     #[test]
@@ -117,19 +116,20 @@ mod tests {
         for seed in 0..6 {
             for split in [Split::Random, Split::Place, Split::PlaceAndPerson] {
                 let [training, test] = split.divide(&all, seed);
-                let both = |of: &dyn Fn(&Sample) -> u64| {
-                    let keys = |part: &[Sample]| part.iter().map(of).collect::<BTreeSet<u64>>();
-                    keys(&training).intersection(&keys(&test)).count()
-                };
-                let places = both(&sector);
-                let people = both(&|sample| sample.person);
+                let keys: [fn(&Sample) -> u64; 3] =
+                    [sector, |sample| sample.person, |sample| sample.frame];
+                let [places, people, frames] = keys.map(|key| {
+                    let [training, test] = [&training, &test]
+                        .map(|part| part.iter().map(key).collect::<BTreeSet<u64>>());
+                    training.intersection(&test).count()
+                });
                 let shared = match split {
                     Split::Random => places > 8 && people == 2,
                     Split::Place => places == 0 && people == 2,
                     Split::PlaceAndPerson => places == 0 && people == 0,
                 };
                 assert!(shared, "{split:?}: {places} places, {people} people");
-                assert_eq!(both(&|sample| sample.frame), 0);
+                assert_eq!(frames, 0);
                 assert!(training.len() > 40 && test.len() > 40, "{split:?}");
                 assert_eq!(split.divide(&all, seed), [training, test]);
             }
@@ -144,7 +144,7 @@ mod tests {
     fn repeats_differ() {
         let all = samples();
         assert_ne!(Split::Place.divide(&all, 0), Split::Place.divide(&all, 1));
-        let who = |seed| Split::PlaceAndPerson.divide(&all, seed)[0][0].person;
-        assert_ne!(who(0), who(1));
+        let [one, other] = [0, 1].map(|seed| Split::PlaceAndPerson.divide(&all, seed)[0][0].person);
+        assert_ne!(one, other);
     }
 }

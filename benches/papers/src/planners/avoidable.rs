@@ -170,7 +170,8 @@ mod tests {
 
     /// Ticks every tenth of a second, in the private zone where `is_near` says so.
     fn ticks(is_near: impl Fn(f64) -> bool) -> Vec<Tick> {
-        let tick = |number: u32| {
+        let mut ticks = Vec::new();
+        for number in 0..100 {
             let at_s = 0.1 * f64::from(number);
             let view = CrowdView {
                 world_from_robot: Isometry2::identity(),
@@ -179,7 +180,7 @@ mod tests {
                 target_in_sight: true,
                 target_arrived: false,
             };
-            Tick {
+            ticks.push(Tick {
                 at_s,
                 speed_mps: if at_s < 3.0 { 0.5 } else { 0.0 },
                 turn_rate: 0.0,
@@ -187,9 +188,9 @@ mod tests {
                 crowd: Some(view),
                 approach: None,
                 reason: None,
-            }
-        };
-        (0..100).map(tick).collect()
+            });
+        }
+        ticks
     }
 
     #[test]

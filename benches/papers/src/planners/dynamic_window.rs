@@ -210,8 +210,8 @@ mod tests {
     #[test]
     fn a_drive_past_an_obstacle_costs_less_the_farther_it_is() {
         let drive = Drive::new(Twist::new(1.0, 0.0));
-        let cost = |y: f64| drive.obstacle_cost(&[Point2::new(1.0, y)], 0.745);
-        assert!(cost(0.8) > cost(1.5) && cost(1.5) > cost(4.0));
+        let costs = [0.8, 1.5, 4.0].map(|y| drive.obstacle_cost(&[Point2::new(1.0, y)], 0.745));
+        assert!(costs[0] > costs[1] && costs[1] > costs[2], "{costs:?}");
         assert_eq!(drive.obstacle_cost(&[Point2::new(0.5, 0.0)], 0.745), COLLISION);
         assert_eq!(drive.obstacle_cost(&[], 0.745), 0.0);
     }

@@ -32,15 +32,10 @@ pub(super) fn centres(readings: &[Point2<f64>]) -> Vec<Point2<f64>> {
 
 /// Returns the clusters by DBSCAN; readings with too few neighbours belong to none.
 fn clusters(readings: &[Point2<f64>]) -> Vec<Vec<Point2<f64>>> {
-    let near = |a: usize| -> Vec<usize> {
-        (0..readings.len())
-            .filter(|b| nalgebra::distance(&readings[a], &readings[*b]) <= NEIGHBOUR_M)
-            .collect()
-    };
     let mut is_taken = vec![false; readings.len()];
     let mut clusters = Vec::new();
     for first in 0..readings.len() {
-        if is_taken[first] || near(first).len() < LEAST {
+        if is_taken[first] || neighbours_of(readings, first).len() < LEAST {
             continue;
         }
         let mut cluster = Vec::new();
@@ -48,7 +43,7 @@ fn clusters(readings: &[Point2<f64>]) -> Vec<Vec<Point2<f64>>> {
         is_taken[first] = true;
         while let Some(reading) = open.pop() {
             cluster.push(readings[reading]);
-            let neighbours = near(reading);
+            let neighbours = neighbours_of(readings, reading);
             // A reading at the border of a cluster belongs to it, but leads no further.
             if neighbours.len() < LEAST {
                 continue;
@@ -63,6 +58,13 @@ fn clusters(readings: &[Point2<f64>]) -> Vec<Vec<Point2<f64>>> {
         clusters.push(cluster);
     }
     clusters
+}
+
+/// Returns the indices of the readings around one, with its own.
+fn neighbours_of(readings: &[Point2<f64>], a: usize) -> Vec<usize> {
+    (0..readings.len())
+        .filter(|b| nalgebra::distance(&readings[a], &readings[*b]) <= NEIGHBOUR_M)
+        .collect()
 }
 
 /// Returns the centre of the rectangle of the smallest area, which lies along an edge of the convex

@@ -159,14 +159,16 @@ fn by_laser(contender: &Contender, finder: &Contender) -> Result<Contender, Repr
 /// Drives all of them.
 pub(super) fn drive(lab: &Lab, what: &str, jobs: &[Job]) -> Result<Vec<Driven>, ReproduceError> {
     lab.progress.begin(jobs.len(), what);
-    let drive = |job: &Job| {
-        let ride = job.ride(lab)?;
-        let Job { setting, planner, .. } = *job;
-        // People of these scenes react, so that there are measures of every ride.
-        let measures = CrowdMeasures::of(&ride.ticks).unwrap_or_default();
-        Ok(Driven { setting, planner, measures, took_ms: ride.took_ms })
-    };
-    Ok(in_order(jobs, lab.jobs, drive, |_| lab.progress.step())?)
+    Ok(in_order(jobs, lab.jobs, |job| drive_one(lab, job), |_| lab.progress.step())?)
+}
+
+/// Drives one ride.
+fn drive_one(lab: &Lab, job: &Job) -> Result<Driven, TrialError> {
+    let ride = job.ride(lab)?;
+    let Job { setting, planner, .. } = *job;
+    // People of these scenes react, so that there are measures of every ride.
+    let measures = CrowdMeasures::of(&ride.ticks).unwrap_or_default();
+    Ok(Driven { setting, planner, measures, took_ms: ride.took_ms })
 }
 
 #[cfg(test)]

@@ -96,30 +96,35 @@ fn prefix(source: Source, target_mps: Option<f64>) -> String {
 }
 
 fn cells(rides: &[&Driven]) -> Vec<Cell> {
-    let count = rides.len() as u64;
-    let share = |is_so: fn(&Driven) -> bool| {
-        Cell::share(rides.iter().filter(|ride| is_so(ride)).count() as u64, count, 1)
-    };
-    let mean = |value: fn(&Driven) -> f64, digits| {
-        let values: Vec<f64> = rides.iter().map(|ride| value(ride)).collect();
-        match mean_interval(&values) {
-            Some(interval) => Cell::estimate(Some(interval), digits).within(0.0, f64::INFINITY),
-            None => Cell::mean(&values, digits),
-        }
-    };
     let took: Vec<f64> = rides.iter().flat_map(|ride| &ride.took_ms).copied().collect();
-    let took = |part| percentile(&took, part).map_or_else(Cell::default, |ms| Cell::number(ms, 2));
+    let [median, most] = [0.5, 0.99]
+        .map(|part| percentile(&took, part).map_or_else(Cell::default, |ms| Cell::number(ms, 2)));
     vec![
-        Cell::number(count as f64, 0),
-        share(|ride| ride.measures.success),
-        share(|ride| ride.measures.search_success),
-        mean(|ride| ride.measures.personal_s, 1),
-        mean(|ride| ride.measures.private_s, 2),
-        mean(|ride| ride.measures.search_m, 1),
-        mean(|ride| ride.measures.jerk_mps3, 2),
-        took(0.5),
-        took(0.99),
+        Cell::number(rides.len() as f64, 0),
+        share_cell(rides, |ride| ride.measures.success),
+        share_cell(rides, |ride| ride.measures.search_success),
+        mean_cell(rides, |ride| ride.measures.personal_s, 1),
+        mean_cell(rides, |ride| ride.measures.private_s, 2),
+        mean_cell(rides, |ride| ride.measures.search_m, 1),
+        mean_cell(rides, |ride| ride.measures.jerk_mps3, 2),
+        median,
+        most,
     ]
+}
+
+/// Returns the share of rides of which something is true.
+fn share_cell(rides: &[&Driven], is_so: fn(&Driven) -> bool) -> Cell {
+    let count = rides.iter().filter(|ride| is_so(ride)).count();
+    Cell::share(count as u64, rides.len() as u64, 1)
+}
+
+/// Returns the mean of a measure over rides.
+fn mean_cell(rides: &[&Driven], value: fn(&Driven) -> f64, digits: usize) -> Cell {
+    let values: Vec<f64> = rides.iter().map(|ride| value(ride)).collect();
+    match mean_interval(&values) {
+        Some(interval) => Cell::estimate(Some(interval), digits).within(0.0, f64::INFINITY),
+        None => Cell::mean(&values, digits),
+    }
 }
 
 fn notes() -> Vec<String> {

@@ -253,11 +253,13 @@ mod tests {
 
     #[test]
     fn it_drives_away_from_a_person_behind_whom_the_corrected_law_turns_to() {
-        let end = |controller: &mut dyn Controller| {
+        let mut printed = printed(Config::default());
+        let mut corrected = corrected();
+        let controllers: [&mut dyn Controller; 2] = [&mut printed, &mut corrected];
+        let [away, [range_m, bearing_rad]] = controllers.map(|controller| {
             *drive(controller, 150, |_| (Point2::new(-2.0, 0.01), Vector2::zeros())).last().unwrap()
-        };
-        assert!(end(&mut printed(Config::default()))[0] > 3.0);
-        let [range_m, bearing_rad] = end(&mut corrected());
+        });
+        assert!(away[0] > 3.0, "{away:?}");
         assert!((range_m - 1.4).abs() < 0.05 && bearing_rad.abs() < 0.05);
     }
 

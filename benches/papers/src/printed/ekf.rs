@@ -307,7 +307,7 @@ mod tests {
 
     #[test]
     fn the_noise_depends_on_the_frame_rate_and_knows_neither_height_nor_ego_motion() {
-        let added = |steps: u32, sigma_w: f64| {
+        let [slow, fast, added] = [(5, 1.0), (50, 1.0), (1, 4.0)].map(|(steps, sigma_w)| {
             let filter = filter(Config { sigma_w, ..Config::default() });
             let mut state = state_at(5.0);
             let before = state.covariance;
@@ -315,10 +315,8 @@ mod tests {
             motion.covariance = Matrix3::identity() * 0.01;
             (0..steps).for_each(|_| filter.predict(&mut state, &motion));
             state.covariance - before
-        };
-        let [slow, fast] = [5, 50].map(|steps| added(steps, 1.0)[(3, 3)]);
-        assert!((slow / fast - 10.0).abs() < 1e-6, "{slow} {fast}");
-        let added = added(1, 4.0);
+        });
+        assert!((slow[(3, 3)] / fast[(3, 3)] - 10.0).abs() < 1e-6, "{slow} {fast}");
         assert!((added[(3, 3)] - 16.0).abs() < 1e-12 && added[(2, 2)] == 0.0, "{added}");
         assert!((added[(0, 0)] - 2.0).abs() < 1e-12, "the velocity's share alone: {added}");
     }

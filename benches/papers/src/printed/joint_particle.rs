@@ -165,21 +165,21 @@ mod tests {
         assert_eq!(PRINTED.choose(&[0.2, 0.5, 0.3], 2, &mut random), [1, 2]);
         assert!((PRINTED.joint_weight([0.5, 0.6]) - 0.3).abs() < 1e-12);
         let drawn = CORRECTED.choose(&[0.2, 0.5, 0.3], 10, &mut random);
-        let count = |index| drawn.iter().filter(|drawn| **drawn == index).count();
-        assert_eq!([count(0), count(1), count(2)], [2, 5, 3], "by their weights");
+        let counts = [0, 1, 2].map(|index| drawn.iter().filter(|drawn| **drawn == index).count());
+        assert_eq!(counts, [2, 5, 3], "by their weights");
         assert_eq!(CORRECTED.joint_weight([0.5, 0.6]), 1.0);
     }
 
     #[test]
     fn without_an_offset_the_first_particle_is_preferred() {
         let weights = [0.1, 0.1, 0.4, 0.4];
-        let first = |steps: &PrintedSteps| {
+        let [printed, corrected] = [&PRINTED, &CORRECTED].map(|steps| {
             let draws = (0..200).map(|seed| steps.resample(&weights, 4, &mut Random::new(seed, 0)));
             draws.filter(|kept| kept[0] == 0).count()
-        };
+        });
         assert_eq!(without_offset(&weights), [0, 2, 2, 3]);
-        assert_eq!(first(&PRINTED), 200);
-        assert!((50..110).contains(&first(&CORRECTED)), "0.4 of 200: {}", first(&CORRECTED));
+        assert_eq!(printed, 200);
+        assert!((50..110).contains(&corrected), "0.4 of 200: {corrected}");
     }
 
     #[test]

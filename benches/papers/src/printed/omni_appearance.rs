@@ -37,9 +37,9 @@ fn forget_the_seam(blob: &mut Blob, columns: &[u16]) {
     if blob.run.first + blob.run.length <= width {
         return;
     }
-    let weight = |column: usize| f64::from(columns[column]);
-    let total: f64 = blob.run.columns(width).map(weight).sum();
-    let sum: f64 = blob.run.columns(width).map(|column| column as f64 * weight(column)).sum();
+    let total: f64 = blob.run.columns(width).map(|column| f64::from(columns[column])).sum();
+    let sum: f64 =
+        blob.run.columns(width).map(|column| column as f64 * f64::from(columns[column])).sum();
     blob.column = sum / total.max(1.0);
     blob.features.width = width as f64;
 }

@@ -343,8 +343,8 @@ mod tests {
 
         // The square of the window is four times as large at half the distance.
         fn ratio(is_rms: bool) -> f64 {
-            let of_depth = |x: f64| d(is_rms, x) / (f64::from(WALL_M) - x);
-            of_depth(3.6) / of_depth(1.8)
+            let [far, near] = [3.6, 1.8].map(|x| d(is_rms, x) / (f64::from(WALL_M) - x));
+            far / near
         }
 
         assert!((ratio(true) - 1.0).abs() < 0.15, "{}", ratio(true));
@@ -356,12 +356,14 @@ mod tests {
         let near = standing(1.8, 0.0);
         let frame = frame(picture(&[Painted::new(&near, Direction::Left)]));
         let weigher = weigher(0.1, false);
-        let log = |scene: &[Person]| weigher.log_likelihood(&frame, scene).unwrap();
-        let moving = |vy| Person { velocity: Vector2::new(0.0, vy), ..near };
-        assert_eq!(log(&[near]), log(&[moving(1.0)]));
-        assert_eq!(log(&[near]), log(&[moving(-1.0)]));
         let hidden = standing(4.0, 0.0);
-        let [still, left, right] = [near, moving(1.0), moving(-1.0)].map(|p| log(&[p, hidden]));
+        let [(alone, still), (alone_left, left), (alone_right, right)] =
+            [0.0, 1.0, -1.0].map(|vy| {
+                let person = Person { velocity: Vector2::new(0.0, vy), ..near };
+                let alone = weigher.log_likelihood(&frame, &[person]).unwrap();
+                (alone, weigher.log_likelihood(&frame, &[person, hidden]).unwrap())
+            });
+        assert_eq!([alone_left, alone_right], [alone; 2]);
         assert!(left > still && left > right, "{left} {still} {right}");
     }
 

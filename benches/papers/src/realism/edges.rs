@@ -103,10 +103,10 @@ fn extent(depth: &DepthImage, seen: &Rect, trunk_m: f32) -> Option<Rect> {
     let body: Vec<(i64, i64)> = body
         .filter(|(x, y)| depth.get(*x, *y).is_some_and(|z| (z - trunk_m).abs() < BODY_M))
         .collect();
-    let xs = || body.iter().map(|(x, _)| *x);
-    let x = xs().min()? as f64;
+    let x = body.iter().map(|(x, _)| *x).min()? as f64;
+    let last = body.iter().map(|(x, _)| *x).max()? as f64;
     let y = body.iter().map(|(_, y)| *y).min()? as f64;
-    Some(Rect::new(x, y, xs().max()? as f64 + 1.0 - x, bottom as f64 - y))
+    Some(Rect::new(x, y, last + 1.0 - x, bottom as f64 - y))
 }
 
 #[cfg(test)]

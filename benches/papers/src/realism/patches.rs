@@ -139,13 +139,10 @@ fn cells(side: usize) -> impl Iterator<Item = (usize, usize)> {
 
 /// Returns the pixels of one cell of a grid over the square, row by row.
 fn cell(depth: &DepthImage, square: &Rect, side: usize, row: usize, column: usize) -> Vec<f32> {
-    let edge = |from: f64, length: f64, index: usize| {
-        (from + length * index as f64 / side as f64) as usize
-    };
-    let left = edge(square.x, square.width, column);
-    let right = edge(square.x, square.width, column + 1);
-    let top = edge(square.y, square.height, row);
-    let bottom = edge(square.y, square.height, row + 1);
+    let [left, right] = [column, column + 1]
+        .map(|index| (square.x + square.width * index as f64 / side as f64) as usize);
+    let [top, bottom] = [row, row + 1]
+        .map(|index| (square.y + square.height * index as f64 / side as f64) as usize);
     let inside = bottom.min(depth.height());
     (top..inside)
         .flat_map(|y| depth.row(y)[left..right.min(depth.width())].iter().copied())
@@ -181,9 +178,9 @@ fn cross_validated(a: &[Vec<Sample>], b: &[Vec<Sample>]) -> f64 {
     }
     let areas = (0..a.len()).filter_map(|fold| {
         let weights = discriminant(&others(a, fold), &others(b, fold))?;
-        let score =
-            |samples: &[Sample]| samples.iter().map(|s| weights.dot(s)).collect::<Vec<f64>>();
-        area(&score(&a[fold]), &score(&b[fold]))
+        let [of_a, of_b] = [&a[fold], &b[fold]]
+            .map(|samples| samples.iter().map(|s| weights.dot(s)).collect::<Vec<f64>>());
+        area(&of_a, &of_b)
     });
     mean(&areas.collect::<Vec<f64>>())
 }
@@ -196,12 +193,10 @@ fn discriminant(a: &[Sample], b: &[Sample]) -> Option<DVector<f64>> {
     }
 
     let size = a.first()?.len();
-    let centre = |all: &[Sample]| all.iter().sum::<DVector<f64>>() / all.len() as f64;
     if b.is_empty() {
         return None;
     }
-    let of_a = centre(a);
-    let of_b = centre(b);
+    let [of_a, of_b] = [a, b].map(|all| all.iter().sum::<DVector<f64>>() / all.len() as f64);
     let mut within = scatter(a, &of_a) + scatter(b, &of_b);
     let ridge = RIDGE * within.trace() / size as f64;
     // The ridge also keeps the matrix positive definite if a feature never varies.
@@ -222,13 +217,17 @@ mod tests {
 
     fn cloud(centre: f64, count: usize, from: u64) -> Vec<Sample> {
         let mut state = from;
-        let mut noise = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 33) as f64 / f64::from(1u32 << 31) - 0.5
-        };
-        (0..count).map(|_| DVector::from_vec(vec![centre + noise(), noise()])).collect()
+        let mut samples = Vec::new();
+        for _ in 0..count {
+            let sample = [centre, 0.0].map(|middle| {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1_442_695_040_888_963_407);
+                middle + ((state >> 33) as f64 / f64::from(1u32 << 31) - 0.5)
+            });
+            samples.push(DVector::from_vec(sample.to_vec()));
+        }
+        samples
     }
 
     #[test]

@@ -129,15 +129,16 @@ fn measure(rig: &Rig, range_m: f64, wallpaper: bool) -> Option<Wall> {
     if fits.is_empty() {
         return None;
     }
-    let of = |pick: fn(&Fit) -> f64| mean(&fits.iter().map(pick).collect::<Vec<f64>>());
-    let residual_m = of(|fit| fit.residual_m);
+    let picks: [fn(&Fit) -> f64; 3] = [|fit| fit.residual_m, |fit| fit.centre_m, |fit| fit.fill];
+    let [residual_m, middle_m, fill] =
+        picks.map(|pick| mean(&fits.iter().map(pick).collect::<Vec<f64>>()));
     // The askew optical axis meets the wall farther away.
     let centre_m = range_m / ASKEW_DEG.to_radians().cos();
     Some(Wall {
         range_m,
         residual_m,
-        bias_m: of(|fit| fit.centre_m) - centre_m,
-        fill: of(|fit| fit.fill),
+        bias_m: middle_m - centre_m,
+        fill,
         sigma_px: residual_m * focal_px * baseline_m / centre_m.powi(2),
     })
 }
@@ -152,20 +153,19 @@ struct Fit {
 fn fit(depth: &DepthImage, window: [f64; 2]) -> Option<Fit> {
     let w = depth.width();
     let h = depth.height();
-    let middle = |side: usize, half: f64| {
-        let at = |part: f64| (part * side as f64).round() as usize;
-        at(0.5 - half)..at(0.5 + half)
-    };
-    let us = middle(w, window[0]);
-    let vs = middle(h, window[1]);
+    let [us, vs] = [(w, window[0]), (h, window[1])].map(|(side, half)| {
+        let [from, to] = [0.5 - half, 0.5 + half].map(|part| (part * side as f64).round() as usize);
+        from..to
+    });
     let all = us.len() * vs.len();
-    let pixel = |u: usize, v: usize| {
-        let z = f64::from(depth.get(u as i64, v as i64)?);
-        let place = Vector3::new(1.0, u as f64 / w as f64 - 0.5, v as f64 / h as f64 - 0.5);
-        (z.is_finite() && z > 0.0).then_some((place, z))
-    };
-    let points: Vec<(Vector3<f64>, f64)> =
-        vs.flat_map(|v| us.clone().filter_map(move |u| pixel(u, v))).collect();
+    let mut points: Vec<(Vector3<f64>, f64)> = Vec::new();
+    for (v, u) in vs.flat_map(|v| us.clone().map(move |u| (v, u))) {
+        let z = depth.get(u as i64, v as i64).map_or(f64::NAN, f64::from);
+        if z.is_finite() && z > 0.0 {
+            let place = Vector3::new(1.0, u as f64 / w as f64 - 0.5, v as f64 / h as f64 - 0.5);
+            points.push((place, z));
+        }
+    }
     // A plane is linear in the inverse depth, so the fit is a linear least-squares problem.
     let normal: Matrix3<f64> = points.iter().map(|(p, _)| p * p.transpose()).sum();
     let right: Vector3<f64> = points.iter().map(|(p, z)| p / *z).sum();

@@ -256,16 +256,19 @@ impl Walk {
 }
 
 fn best(scores: &[Score], goal: Goal) -> usize {
-    let mota = |at: usize| scores[at].tally.clear.mota();
-    let loss = |at: usize| match goal {
-        // Errors that agree to the millimetre count as equal, and MOTA decides.
-        Goal::Place => (1e3 * scores[at].error_m()).round(),
-        Goal::Sightings => -mota(at),
-    };
-    let known = (0..scores.len()).filter(|at| loss(*at).is_finite());
-    known
-        .min_by(|a, b| loss(*a).total_cmp(&loss(*b)).then_with(|| mota(*b).total_cmp(&mota(*a))))
-        .unwrap_or(0)
+    let losses = scores.iter().enumerate().map(|(at, score)| {
+        let mota = score.tally.clear.mota();
+        let loss = match goal {
+            // Errors that agree to the millimetre count as equal, and MOTA decides.
+            Goal::Place => (1e3 * score.error_m()).round(),
+            Goal::Sightings => -mota,
+        };
+        (at, loss, mota)
+    });
+    losses
+        .filter(|(_, loss, _)| loss.is_finite())
+        .min_by(|a, b| a.1.total_cmp(&b.1).then_with(|| b.2.total_cmp(&a.2)))
+        .map_or(0, |(at, ..)| at)
 }
 
 /// Scores the positions of the followed person, predicted ones included, and the detections of all

@@ -34,10 +34,6 @@ pub fn ladder(lab: &Lab) -> Result<Findings, ReproduceError> {
         let scenes = lab.scenes(suite, &[STEREO], lab.seeds(50))?;
         draws.push(lab.trials(suite, &scenes, &contenders, judged)?);
     }
-    let error: Figure = |judged| {
-        let errors = &judged.errors_in_robot_m;
-        1e3 * errors.iter().sum::<f64>() / errors.len() as f64
-    };
     let tables = vec![
         table(
             "IDF1: are all people found, each under one number?",
@@ -52,10 +48,16 @@ pub fn ladder(lab: &Lab) -> Result<Findings, ReproduceError> {
         table(
             "Mean error of matched places, robot frame, mm",
             &draws,
-            Score { digits: 0, range: [0.0, f64::INFINITY], of: error },
+            Score { digits: 0, range: [0.0, f64::INFINITY], of: mean_error_mm },
         ),
     ];
     Ok(Findings { tables, pictures: Vec::new() })
+}
+
+/// Returns the mean error of matched places in the frame of the robot, mm.
+fn mean_error_mm(judged: &Judged) -> f64 {
+    let errors = &judged.errors_in_robot_m;
+    1e3 * errors.iter().sum::<f64>() / errors.len() as f64
 }
 
 fn judged(trial: Trial) -> Result<Vec<Judged>, TrialError> {
@@ -114,8 +116,9 @@ mod tests {
     #[test]
     fn steps_are_paired_and_draws_that_say_nothing_are_left_out() {
         let draws = [draw([0.3, 0.2, 0.1]), draw([0.5, 0.4, 0.2]), draw([f64::NAN, 0.0, 0.0])];
-        let error: Figure = |judged| judged.errors_in_robot_m[0];
-        let cells = cells(&draws, Score { digits: 1, range: [0.0, f64::INFINITY], of: error });
+        let range = [0.0, f64::INFINITY];
+        let score = Score { digits: 1, range, of: |judged| judged.errors_in_robot_m[0] };
+        let cells = cells(&draws, score);
         let values: Vec<f64> = cells.iter().map(|cell| cell.value.unwrap()).collect();
         let expected = [0.4, 0.3, 0.15, -0.1, -0.15];
         assert!(values.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{values:?}");

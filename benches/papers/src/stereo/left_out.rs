@@ -114,13 +114,7 @@ pub fn left_out(lab: &Lab) -> Result<Findings, ReproduceError> {
         }
         for (judges, (things, people)) in judges.iter_mut().zip(things.iter_mut().zip(&mut people))
         {
-            let mut rejects = |at: usize| -> Result<u64, ReproduceError> {
-                let margin = judges[at]
-                    .log_odds(frame, sighting.detection)
-                    .map_err(ReproduceError::other)?;
-                Ok(u64::from(sighting.detection.score + margin < 0.0))
-            };
-            let all = rejects(KINDS.len())?;
+            let all = rejections(judges[KINDS.len()].as_mut(), frame, sighting.detection)?;
             for (at, kind) in KINDS.iter().enumerate() {
                 let of = match sighting.thing {
                     _ if sighting.is_person => &mut *people,
@@ -128,12 +122,23 @@ pub fn left_out(lab: &Lab) -> Result<Findings, ReproduceError> {
                     _ => continue,
                 };
                 of.with = [of.with[0] + 1, of.with[1] + all];
-                of.without = [of.without[0] + 1, of.without[1] + rejects(at)?];
+                let rejected = rejections(judges[at].as_mut(), frame, sighting.detection)?;
+                of.without = [of.without[0] + 1, of.without[1] + rejected];
             }
         }
         Ok(())
     })?;
     Ok(table(&things, &people, counts, seeds).into())
+}
+
+/// Returns one if a verifier rejects a candidate, and zero if not.
+fn rejections(
+    judge: &mut dyn Verifier,
+    frame: &Frame,
+    candidate: &Detection,
+) -> Result<u64, ReproduceError> {
+    let margin = judge.log_odds(frame, candidate).map_err(ReproduceError::other)?;
+    Ok(u64::from(candidate.score + margin < 0.0))
 }
 
 fn table(
@@ -327,10 +332,10 @@ mod tests {
         let things = [[judged([10, 9], [10, 5]); KINDS.len()]; VERIFIERS.len()];
         let people = [judged([60, 6], [60, 12]); VERIFIERS.len()];
         let page = table(&things, &people, [3, 4], 2);
-        let value = |row: usize, column: usize| page.rows[row].cells[column].value.unwrap();
-        assert_eq!((value(0, 0), value(0, 1), value(0, 2)), (60.0, 50.0, 90.0));
-        let last = page.rows.len() - 1;
-        assert_eq!((value(last, 0), value(last, 1), value(last, 2)), (10.0, 20.0, 10.0));
+        for (row, values) in [(0, [60.0, 50.0, 90.0]), (page.rows.len() - 1, [10.0, 20.0, 10.0])] {
+            let cells = &page.rows[row].cells;
+            assert_eq!([0, 1, 2].map(|column| cells[column].value.unwrap()), values);
+        }
         assert_eq!(page.rows.len(), KINDS.len() + 2);
         assert!(page.notes[0].contains("4 proposals of people and 3 of others in 12"));
     }

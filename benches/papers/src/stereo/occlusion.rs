@@ -76,9 +76,10 @@ fn table(cases: &[Case], draws: usize) -> Table {
 fn row(cases: &[&Case]) -> Vec<Cell> {
     (0..PIPELINES.len())
         .map(|at| {
-            let tracked = || cases.iter().map(|case| case.outcomes[at]).filter(tracked_before);
-            let kept = tracked().filter(|outcome| *outcome == Outcome::Kept).count() as u64;
-            Cell::share(kept, tracked().count() as u64, 0)
+            let tracked = cases.iter().map(|case| case.outcomes[at]).filter(tracked_before);
+            let count = tracked.clone().count() as u64;
+            let kept = tracked.filter(|outcome| *outcome == Outcome::Kept).count() as u64;
+            Cell::share(kept, count, 0)
         })
         .collect()
 }

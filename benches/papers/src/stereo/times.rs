@@ -105,8 +105,9 @@ pub fn boundary_points(lab: &Lab) -> Result<Findings, ReproduceError> {
         rows: (0..forms.len())
             .map(|at| {
                 let times: Vec<f64> = frames[at].iter().map(|groups| groups[DETECTION]).collect();
-                let time = |part| Cell::number(percentile(&times, part).unwrap_or(f64::NAN), 1);
-                Row::ours(forms[at].0, vec![time(0.5), time(0.95)])
+                let cells = [0.5, 0.95]
+                    .map(|part| Cell::number(percentile(&times, part).unwrap_or(f64::NAN), 1));
+                Row::ours(forms[at].0, cells.into())
             })
             .collect(),
         notes: vec![

@@ -174,9 +174,9 @@ fn found(turns: &[Vec<TurntableImage>], which: usize) -> Vec<Cell> {
     (0..DISTANCES_M.len())
         .map(|distance| {
             let hits = turns.iter().map(|turn| {
-                let at = || turn.iter().filter(move |image| image.distance == distance);
-                let hits = at().filter(|image| image.errors_m[which].is_some()).count() as u64;
-                [hits, at().count() as u64]
+                let at = turn.iter().filter(|image| image.distance == distance);
+                let count = at.clone().count() as u64;
+                [at.filter(|image| image.errors_m[which].is_some()).count() as u64, count]
             });
             Cell::clustered(&hits.collect::<Vec<_>>(), 0)
         })
@@ -215,9 +215,8 @@ fn of_trial(trial: Trial) -> Result<Vec<TurntableImage>, TrialError> {
 fn look(trial: &Trial, at: usize) -> Option<TurntableImage> {
     let moment = &trial.moments[at];
     let range_m = range_m(&moment.truth.first()?.head_in_robot, &trial.camera);
-    let away = |distance: &f64| (distance - moment.truth[0].head_in_robot.x).abs();
-    let nearest = (0..DISTANCES_M.len())
-        .min_by(|a, b| away(&DISTANCES_M[*a]).total_cmp(&away(&DISTANCES_M[*b])))?;
+    let away_m = DISTANCES_M.map(|distance| (distance - moment.truth[0].head_in_robot.x).abs());
+    let nearest = (0..away_m.len()).min_by(|a, b| away_m[*a].total_cmp(&away_m[*b]))?;
     let errors_m = trial
         .runs
         .iter()
@@ -236,8 +235,9 @@ fn range_m(place: &nalgebra::Point3<f64>, camera: &Camera) -> f64 {
 /// Returns the accepted detection of the person, if there is one.
 fn sighting<'a>(candidates: &'a [Candidate], moment: &Moment) -> Option<&'a Detection> {
     let head = moment.truth.first()?.head_in_robot;
-    let off = |c: &Candidate| (c.detection.position - head).xy().norm();
     let believed = candidates.iter().filter(|c| !matches!(c.fate, Fate::Dropped(_)));
-    let nearest = believed.min_by(|a, b| off(a).total_cmp(&off(b)))?;
-    (off(nearest) <= NEAR_M).then_some(&nearest.detection)
+    let (off_m, nearest) = believed
+        .map(|c| ((c.detection.position - head).xy().norm(), c))
+        .min_by(|a, b| a.0.total_cmp(&b.0))?;
+    (off_m <= NEAR_M).then_some(&nearest.detection)
 }

@@ -181,10 +181,11 @@ fn things_table(tallies: &[Tally]) -> Table {
         tallies.iter().flat_map(|tally| tally.things.keys().copied()).collect();
     let removed = PIPELINES[1..].iter().map(|name| format!("{name}: removed %"));
     let rows = kinds.into_iter().map(|kind| {
-        let of = |tally: &Tally| tally.things.get(kind).copied().unwrap_or_default();
-        let before = Cell::number(of(&tallies[0])[0] as f64, 0);
-        let removed = tallies[1..].iter().map(|tally| share(of(tally)));
-        Row::ours(kind, std::iter::once(before).chain(removed).collect())
+        let mut counts =
+            tallies.iter().map(|tally| tally.things.get(kind).copied().unwrap_or_default());
+        let before = counts.next().unwrap_or_default();
+        let before = Cell::number(before[0] as f64, 0);
+        Row::ours(kind, std::iter::once(before).chain(counts.map(share)).collect())
     });
     Table {
         title: "False sightings by what stands there".into(),
@@ -223,11 +224,11 @@ fn tracks_table(rows: Vec<Row>, simulated: &str) -> Table {
 }
 
 fn tallies(trial: Trial) -> Result<Vec<Tally>, TrialError> {
-    let covers = |run: usize| -> Vec<BTreeSet<u16>> {
-        let both = trial.moments.iter().zip(&trial.runs[run].reports);
-        both.map(|(moment, report)| covered(moment, report)).collect()
-    };
-    let plain = covers(0);
+    let mut covers: Vec<Vec<BTreeSet<u16>>> = Vec::new();
+    for run in &trial.runs {
+        let both = trial.moments.iter().zip(&run.reports);
+        covers.push(both.map(|(moment, report)| covered(moment, report)).collect());
+    }
     let tallies = (0..trial.runs.len()).map(|run| {
         let mut tally = Tally::default();
         let mut false_tracks = BTreeSet::new();
@@ -235,7 +236,7 @@ fn tallies(trial: Trial) -> Result<Vec<Tally>, TrialError> {
             tally.frame(moment, report, &trial.furniture, &mut false_tracks);
         }
         tally.false_tracks = false_tracks.len() as u64;
-        tally.compare(&plain, &covers(run));
+        tally.compare(&covers[0], &covers[run]);
         tally
     });
     Ok(tallies.collect())
@@ -345,12 +346,14 @@ pub enum Whose {
 
 /// Labels a detection by the truth.
 pub fn whose(detection: &Detection, people: &[Truth]) -> Whose {
-    let off = |truth: &Truth| (detection.position - truth.head_in_robot).xy().norm();
-    let nearest = people.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+    let nearest = people
+        .iter()
+        .map(|truth| ((detection.position - truth.head_in_robot).xy().norm(), truth))
+        .min_by(|a, b| a.0.total_cmp(&b.0));
     match nearest {
         None => Whose::Nobody,
-        Some(truth) if off(truth) > NOBODY_M => Whose::Nobody,
-        Some(truth) if off(truth) <= SAME_M && overlaps(detection, truth) => Whose::Somebody,
+        Some((off_m, _)) if off_m > NOBODY_M => Whose::Nobody,
+        Some((off_m, truth)) if off_m <= SAME_M && overlaps(detection, truth) => Whose::Somebody,
         Some(_) => Whose::Unclear,
     }
 }
@@ -364,9 +367,14 @@ fn overlaps(detection: &Detection, truth: &Truth) -> bool {
 
 /// Returns the name of the furniture at a position in the world.
 pub fn what_stands_at(at: Point2<f64>, furniture: &[Furniture]) -> &'static str {
-    let off = |piece: &Furniture| (at - Point2::from(piece.at)).norm();
-    let nearest = furniture.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
-    nearest.filter(|piece| off(piece) <= FURNITURE_M).map_or("anything else", |p| p.kind.name())
+    let nearest = furniture
+        .iter()
+        .map(|piece| ((at - Point2::from(piece.at)).norm(), piece))
+        .min_by(|a, b| a.0.total_cmp(&b.0));
+    match nearest {
+        Some((off_m, piece)) if off_m <= FURNITURE_M => piece.kind.name(),
+        _ => "anything else",
+    }
 }
 
 fn off_m(track: &Track, truth: &Truth) -> f64 {

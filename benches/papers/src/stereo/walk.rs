@@ -88,25 +88,24 @@ pub fn by_wheels(lab: &Lab) -> Result<Findings, ReproduceError> {
 }
 
 fn wheels_table(columns: &[Vec<Walk>]) -> Table {
-    let row = |name: &str, of: fn(&Walk) -> &[f64]| {
-        Row::ours(
-            name,
-            columns.iter().map(|walks| mean_mm(&walks.iter().map(of).collect())).collect(),
-        )
-    };
+    let errors: [(&str, fn(&Walk) -> &[f64]); 5] = [
+        ("stereo-svm-ekf, frame of the start", |walk| &walk.errors[0].in_start),
+        ("stereo-svm-ekf, frame of the robot", |walk| &walk.errors[0].in_robot),
+        ("stereo-verified, frame of the start", |walk| &walk.errors[1].in_start),
+        ("stereo-verified, frame of the robot", |walk| &walk.errors[1].in_robot),
+        ("no tracker: the drift of the wheels, frame of the start", |walk| &walk.drift),
+    ];
+    let rows = errors.map(|(name, of)| {
+        let cells = columns.iter().map(|walks| mean_mm(&walks.iter().map(of).collect()));
+        Row::ours(name, cells.collect())
+    });
     let draws = columns.first().map_or(0, Vec::len);
     Table {
         title: "Mean error of the place of the person who is followed, mm, by the error of the \
                 wheels"
             .into(),
         columns: WHEEL_ERRORS.map(|error| format!("wheels off by {error}")).to_vec(),
-        rows: vec![
-            row("stereo-svm-ekf, frame of the start", |walk| &walk.errors[0].in_start),
-            row("stereo-svm-ekf, frame of the robot", |walk| &walk.errors[0].in_robot),
-            row("stereo-verified, frame of the start", |walk| &walk.errors[1].in_start),
-            row("stereo-verified, frame of the robot", |walk| &walk.errors[1].in_robot),
-            row("no tracker: the drift of the wheels, frame of the start", |walk| &walk.drift),
-        ],
+        rows: rows.into(),
         notes: vec![
             format!("{draws} simulated walks for each column; intervals: 95 %, over walks"),
             "Off by: the standard deviation of the radius of each wheel and of their distance, as \
@@ -229,29 +228,25 @@ fn table(walks: &[Walk], variants: &[Variant]) -> Table {
     let published = [125.0, nan, nan, 336.0, nan].map(|mm| Cell::number(mm, 0)).to_vec();
     let mut rows = vec![Row::published("one walk, frame of the start", published)];
     for (at, Variant { name, .. }) in variants.iter().enumerate() {
-        let of =
-            |frame: fn(&Errors) -> &[f64]| walks.iter().map(|w| frame(&w.errors[at])).collect();
         let lost = walks.iter().map(|w| [w.errors[at].without, w.errors[at].frames]);
         let without = Cell::clustered(&lost.collect::<Vec<_>>(), 1);
-        let mut row = |frame: &str, errors: Walks<'_>| {
+        let frames: [(&str, fn(&Errors) -> &[f64]); 2] =
+            [("start", |errors| &errors.in_start), ("robot", |errors| &errors.in_robot)];
+        for (frame, of) in frames {
+            let errors: Walks<'_> = walks.iter().map(|walk| of(&walk.errors[at])).collect();
             let cells = cells(&errors).into_iter().chain([without.clone()]).collect();
             rows.push(Row::ours(format!("{name}, frame of the {frame}"), cells));
-        };
-        row("start", of(|e| &e.in_start));
-        row("robot", of(|e| &e.in_robot));
+        }
     }
-    let mut bound = |what: &str, of: Walks<'_>| {
-        let cells = cells(&of).into_iter().chain([Cell::default()]).collect();
+    let bounds: [(&str, fn(&Walk) -> &[f64]); 2] = [
+        ("the drift of the wheels, frame of the start", |walk| &walk.drift),
+        ("exact while half shows, then the pace kept", |walk| &walk.pace),
+    ];
+    for (what, of) in bounds {
+        let errors: Walks<'_> = walks.iter().map(of).collect();
+        let cells = cells(&errors).into_iter().chain([Cell::default()]).collect();
         rows.push(Row::ours(format!("no tracker: {what}"), cells));
-    };
-    bound(
-        "the drift of the wheels, frame of the start",
-        walks.iter().map(|walk| &walk.drift[..]).collect(),
-    );
-    bound(
-        "exact while half shows, then the pace kept",
-        walks.iter().map(|walk| &walk.pace[..]).collect(),
-    );
+    }
     let columns =
         ["mean mm", "95 % below mm", "worst of a walk, median mm", "worst mm", "without a place %"];
     Table {
@@ -297,12 +292,11 @@ fn cells(walks: &Walks<'_>) -> Vec<Cell> {
 
 /// Returns the mean error over all frames, mm, with its interval over walks.
 fn mean_mm(walks: &Walks<'_>) -> Cell {
-    let mean = |drawn: &[usize]| {
-        let errors = || drawn.iter().flat_map(|&walk| walks[walk]);
-        1e3 * errors().sum::<f64>() / errors().count() as f64
-    };
+    let interval = draws_interval(walks.len(), |drawn| {
+        let errors = drawn.iter().flat_map(|&walk| walks[walk]);
+        1e3 * errors.clone().sum::<f64>() / errors.count() as f64
+    });
     // A mean of distances is not negative, but the interval may reach below zero.
-    let interval = draws_interval(walks.len(), mean);
     Cell::estimate(interval.map(|mean| mean.within(0.0, f64::INFINITY)), 0)
 }
 

@@ -111,12 +111,14 @@ fn equations(
 fn derivative(station: &Station, s: &(Point2<f64>, Point2<f64>), unit: f64) -> Vector4<f64> {
     const STEP: f64 = 1e-6;
     let parameters = station.parameters(unit);
-    let at = |i: usize, step: f64| {
-        let mut moved = parameters;
-        moved[i] += step;
-        misfit(&station.with(&moved, unit), s)
-    };
-    Vector4::from_fn(|i, _| wrapped(at(i, STEP) - at(i, -STEP)) / (2.0 * STEP))
+    Vector4::from_fn(|i, _| {
+        let [after, before] = [STEP, -STEP].map(|step| {
+            let mut moved = parameters;
+            moved[i] += step;
+            misfit(&station.with(&moved, unit), s)
+        });
+        wrapped(after - before) / (2.0 * STEP)
+    })
 }
 
 #[cfg(test)]

@@ -128,10 +128,14 @@ pub fn triangulate(args: &TriangulateArgs) -> Outcome {
 }
 
 fn guess(path: &Path) -> Result<Vec<WebcamSettings>, Failure> {
-    let wrong = |why: String| Failure::usage(format!("{}: {why}", path.display()));
-    let text = read_text(path, FileLimit::Config).map_err(|error| wrong(error.to_string()))?;
-    let guess: Guess = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+    let text = read_text(path, FileLimit::Config).map_err(|error| failure_of(path, error))?;
+    let guess: Guess = toml::from_str(&text).map_err(|error| failure_of(path, error))?;
     Ok(guess.webcams)
+}
+
+/// Returns the failure of a command whose file is wrong.
+fn failure_of(path: &Path, why: impl std::fmt::Display) -> Failure {
+    Failure::usage(format!("{}: {why}", path.display()))
 }
 
 fn put(path: &Path, text: &str) -> Result<(), Failure> {
@@ -156,8 +160,7 @@ type Places = BTreeMap<u64, Point2<f64>>;
 
 /// Reads the places of a file, by stamp.
 fn known_places(path: &Path, seen: &CameraSightings) -> Result<Places, Failure> {
-    let wrong = |why: String| Failure::usage(format!("{}: {why}", path.display()));
-    let text = read_text(path, FileLimit::Table).map_err(|error| wrong(error.to_string()))?;
+    let text = read_text(path, FileLimit::Table).map_err(|error| failure_of(path, error))?;
     let first = seen.first.map_or(0, |stamp| stamp.nanos());
     let mut places = Places::new();
     for (number, line) in text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty()) {
@@ -168,7 +171,10 @@ fn known_places(path: &Path, seen: &CameraSightings) -> Result<Places, Failure> 
             }
             // The first line may be a heading.
             _ if number == 0 => {}
-            _ => return Err(wrong(format!("line {}: not `seconds,x_m,y_m`", number + 1))),
+            _ => {
+                let why = format!("line {}: not `seconds,x_m,y_m`", number + 1);
+                return Err(failure_of(path, why));
+            }
         }
     }
     Ok(places)

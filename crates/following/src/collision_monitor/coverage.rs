@@ -268,12 +268,16 @@ mod tests {
     #[test]
     fn rays_from_which_nothing_came_back_are_free_where_a_camera_sees() {
         let settings = CollisionMonitorSettings::default();
-        let both = |instead, look| {
+        for (instead, look, part) in [
+            // A hall larger than the range.
+            (f64::INFINITY, Look::Seen, 1.0),
+            (f64::INFINITY, Look::Unknown, 0.0),
+            // A scanner that says nothing.
+            (f64::NAN, Look::Seen, 0.0),
+        ] {
             let scanner = Coverage::of_scan(&settings, &scan(30, instead), 0.3);
-            allowed_part(&[camera(look), scanner], &footprint(), AHEAD, 1.3)
-        };
-        assert_eq!(both(f64::INFINITY, Look::Seen), 1.0, "a hall larger than the range");
-        assert_eq!(both(f64::INFINITY, Look::Unknown), 0.0);
-        assert_eq!(both(f64::NAN, Look::Seen), 0.0, "a scanner that says nothing");
+            let found = allowed_part(&[camera(look), scanner], &footprint(), AHEAD, 1.3);
+            assert_eq!(found, part, "{instead}");
+        }
     }
 }

@@ -119,14 +119,18 @@ mod tests {
     #[test]
     fn distances_are_those_to_the_edges_and_corners_and_zero_inside() {
         let square = square();
-        let far = |x: f64, y: f64| square.distance_m(&Point2::new(x, y));
-        assert_eq!((far(0.0, 0.0), far(0.29, -0.19)), (0.0, 0.0));
-        assert!((far(0.8, 0.1) - 0.5).abs() < 1e-12 && (far(0.0, -0.5) - 0.3).abs() < 1e-12);
-        assert!((far(0.6, 0.6) - 0.5).abs() < 1e-12, "3-4-5 from the corner");
+        for (x, y) in [(0.0, 0.0), (0.29, -0.19)] {
+            assert_eq!(square.distance_m(&Point2::new(x, y)), 0.0);
+        }
+        // The last is 3-4-5 from the corner.
+        for (x, y, wanted_m) in [(0.8, 0.1, 0.5), (0.0, -0.5, 0.3), (0.6, 0.6, 0.5)] {
+            let far_m = square.distance_m(&Point2::new(x, y));
+            assert!((far_m - wanted_m).abs() < 1e-12, "{x} {y}: {far_m}");
+        }
         assert!((square.radius_m() - 0.13_f64.sqrt()).abs() < 1e-12);
         assert_eq!(square.front_m(), 0.3);
-        let deep = |x: f64, y: f64| square.depth_m(&Point2::new(x, y));
-        assert!((deep(0.25, 0.0) - 0.05).abs() < 1e-12 && deep(0.8, 0.0) == 0.0);
+        assert!((square.depth_m(&Point2::new(0.25, 0.0)) - 0.05).abs() < 1e-12);
+        assert_eq!(square.depth_m(&Point2::new(0.8, 0.0)), 0.0);
     }
 
     #[test]

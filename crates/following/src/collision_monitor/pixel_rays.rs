@@ -68,11 +68,16 @@ impl PixelRays {
 fn table(sampling: &Sampling) -> Table {
     let Sampling { lens, width, height, step } = *sampling;
     let camera = Camera { lens, width, height, robot_from_camera: Isometry3::identity() };
-    let ray = |x: usize, y: usize| camera.ray(Point2::new(x as f64, y as f64));
     if matches!(&lens, Lens::Pinhole(lens) if lens.distortion == Distortion::None) {
         return Table::Straight {
-            columns: (0..width).step_by(step).map(|x| ray(x, 0).x).collect(),
-            rows: (0..height).step_by(step).map(|y| ray(0, y).y).collect(),
+            columns: (0..width)
+                .step_by(step)
+                .map(|x| camera.ray(Point2::new(x as f64, 0.0)).x)
+                .collect(),
+            rows: (0..height)
+                .step_by(step)
+                .map(|y| camera.ray(Point2::new(0.0, y as f64)).y)
+                .collect(),
         };
     }
     let has_viewpoint = !matches!(lens, Lens::Panorama(_));
@@ -80,9 +85,9 @@ fn table(sampling: &Sampling) -> Table {
     let mut starts = Vec::new();
     for y in (0..height).step_by(step) {
         for x in (0..width).step_by(step) {
-            rays.push(ray(x, y));
+            let pixel = Point2::new(x as f64, y as f64);
+            rays.push(camera.ray(pixel));
             if !has_viewpoint {
-                let pixel = Point2::new(x as f64, y as f64);
                 starts.push(camera.back_project(pixel, 0.0).coords);
             }
         }

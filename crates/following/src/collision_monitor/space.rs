@@ -356,22 +356,24 @@ mod tests {
     fn rays_side_by_side_free_the_same_places_as_one_at_a_time() {
         let eye = Point2::new(0.2, -0.1);
         // Rays of very different lengths beside each other.
-        let end = |ray: u32| {
-            let angle = f64::from(ray) * 0.0087;
-            let length_m = 0.3 + f64::from(ray * 37 % 101) * 0.09;
-            eye + length_m * nalgebra::Vector2::new(angle.cos(), angle.sin())
-        };
+        let ends: Vec<Point2<f64>> = (0..720)
+            .map(|ray| {
+                let angle = f64::from(ray) * 0.0087;
+                let length_m = 0.3 + f64::from(ray * 37 % 101) * 0.09;
+                eye + length_m * nalgebra::Vector2::new(angle.cos(), angle.sin())
+            })
+            .collect();
         let mut together = SpaceGrid::default();
         let mut single = SpaceGrid::default();
         for step in 0..3 {
             for grid in [&mut together, &mut single] {
                 grid.advance(&EgoMotion { forward: 0.3, turn: 0.4, ..EgoMotion::at_rest(0.1) });
             }
-            let met = || (0..720).filter(|ray| ray % 3 == step).map(end);
-            together.add(eye, met(), (0..720).map(end));
-            single.add(eye, met(), std::iter::empty());
-            for ray in 0..720 {
-                single.add(eye, std::iter::empty(), std::iter::once(end(ray)));
+            let met = ends.iter().copied().skip(step).step_by(3);
+            together.add(eye, met.clone(), ends.iter().copied());
+            single.add(eye, met, std::iter::empty());
+            for end in &ends {
+                single.add(eye, std::iter::empty(), std::iter::once(*end));
             }
         }
         assert!(

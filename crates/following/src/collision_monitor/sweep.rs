@@ -402,13 +402,12 @@ mod tests {
         // A bar 0.6 m long, turned about its end: the tail sweeps the place beside it.
         let bar = Footprint::new(&[[0.1, 0.1], [0.1, -0.1], [-0.5, -0.1], [-0.5, 0.1]]);
         let settings = CollisionMonitorSettings::default();
-        let turn = |left| {
-            let path = Path::Turn { left };
-            let beside = [still(-0.35, -0.35)];
-            allowance(&settings, &bar, &beside, path, 1.5, &BRAKING).most
-        };
-        assert!(turn(true) < 1.0, "the tail turns to the right: {}", turn(true));
-        assert_eq!(turn(false), f64::INFINITY);
+        let beside = [still(-0.35, -0.35)];
+        let [left, right] = [true, false].map(|left| {
+            allowance(&settings, &bar, &beside, Path::Turn { left }, 1.5, &BRAKING).most
+        });
+        assert!(left < 1.0, "the tail turns to the right: {left}");
+        assert_eq!(right, f64::INFINITY);
     }
 
     #[test]
@@ -454,23 +453,19 @@ mod tests {
     #[test]
     fn before_a_person_the_wheels_have_time_to_come_to_rest() {
         let settings = CollisionMonitorSettings::default();
-        let hazards = [moving(2.2, 0.0, 1.6)];
-        let speed = 0.9;
-        let most = |settle_s: f64| {
-            let braking = Braking { settle_s, ..BRAKING };
-            allowance(&settings, &octagon(), &hazards, AHEAD, speed, &braking).most
-        };
-        let slow = most(0.25);
+        let [[slow, fast], [to_thing, to_thing_at_once]] = [moving(2.2, 0.0, 1.6), still(1.2, 0.0)]
+            .map(|hazard| {
+                [0.25, 0.0].map(|settle_s| {
+                    let braking = Braking { settle_s, ..BRAKING };
+                    allowance(&settings, &octagon(), &[hazard], AHEAD, 0.9, &braking).most
+                })
+            });
         let separation_m = 1.6 * (0.75 + slow) + 0.5 * slow + 0.5 * slow * slow;
         let gap_m = 2.2 - octagon().front_m() - settings.protective_m;
         assert!((separation_m - gap_m).abs() < 0.02, "{slow} {separation_m} {gap_m}");
-        assert!(slow < most(0.0) - 0.1, "{slow}");
+        assert!(slow < fast - 0.1, "{slow} {fast}");
         // Things that stand come no nearer meanwhile.
-        let thing = |settle_s: f64| {
-            let braking = Braking { settle_s, ..BRAKING };
-            allowance(&settings, &octagon(), &[still(1.2, 0.0)], AHEAD, speed, &braking).most
-        };
-        assert_eq!(thing(0.25), thing(0.0));
+        assert_eq!(to_thing, to_thing_at_once);
     }
 
     #[test]
@@ -515,15 +510,14 @@ mod tests {
     #[test]
     fn single_points_are_noise_and_add_up_along_the_way() {
         let settings = CollisionMonitorSettings::default();
-        let some = |points: &[(f64, u32)]| {
-            let hazards: Vec<Hazard> = points
-                .iter()
-                .map(|(x, points)| Hazard { points: *points, ..still(*x, 0.0) })
-                .collect();
+        let cases = [vec![(0.9, 5)], vec![(0.9, 6)], vec![(0.9, 3), (1.2, 3)], vec![(1.2, 6)]];
+        let [few, enough, both, together] = cases.map(|points| {
+            let hazards: Vec<Hazard> =
+                points.into_iter().map(|(x, points)| Hazard { points, ..still(x, 0.0) }).collect();
             allowance(&settings, &octagon(), &hazards, AHEAD, 0.9, &BRAKING).most
-        };
-        assert_eq!(some(&[(0.9, 5)]), f64::INFINITY);
-        assert!(some(&[(0.9, 6)]) < 0.5);
-        assert_eq!(some(&[(0.9, 3), (1.2, 3)]), some(&[(1.2, 6)]), "both together");
+        });
+        assert_eq!(few, f64::INFINITY);
+        assert!(enough < 0.5, "{enough}");
+        assert_eq!(both, together);
     }
 }

@@ -323,9 +323,10 @@ fn what_appears_in_a_free_place_needs_more_room_than_what_stands() {
     fn since(first: usize) -> Allowance {
         let mut monitor = monitor();
         for index in 0..24 {
-            let thing = |deg: i32| (index >= first && (80..100).contains(&deg)).then_some(1.2);
-            let frame =
-                frame(index, EgoMotion::at_rest(0.1), None, Some(scan_at(index, 0.0, 0.0, thing)));
+            let scan = scan_at(index, 0.0, 0.0, |deg| {
+                (index >= first && (80..100).contains(&deg)).then_some(1.2)
+            });
+            let frame = frame(index, EgoMotion::at_rest(0.1), None, Some(scan));
             monitor.update(&frame, &frame.motion, &[], None);
         }
         monitor.allowance(AHEAD, 0.9, &BRAKING)
@@ -472,7 +473,17 @@ fn a_source_that_never_delivered_or_falls_silent_stops_the_robot() {
 fn a_sensor_that_falls_silent_and_the_lack_of_all_sensors_are_no_eyes() {
     let mut monitor = monitor();
     let mut index = 0;
-    let mut sees = |has_depth: bool, has_laser: bool, frames: u32| {
+    for (has_depth, has_laser, frames, sees, why) in [
+        (false, false, 1, false, "no sensor at all"),
+        (true, false, 20, true, "there never was a laser"),
+        (false, false, 1, false, "not even a frame without depth"),
+        (true, true, 1, true, "both"),
+        (true, false, 4, true, "a scan is late"),
+        (true, false, 1, false, "the laser is silent"),
+        (true, true, 1, true, "both again"),
+        (false, true, 4, true, "an image is late"),
+        (false, true, 1, false, "the camera is silent"),
+    ] {
         for _ in 0..frames {
             index += 1;
             let depth = has_depth.then(|| depth_at(index, 0.0, 0.0));
@@ -480,16 +491,8 @@ fn a_sensor_that_falls_silent_and_the_lack_of_all_sensors_are_no_eyes() {
             let frame = frame(index, EgoMotion::at_rest(0.1), depth, scan);
             monitor.update(&frame, &frame.motion, &[], None);
         }
-        monitor.stop_reason(0.45).is_none()
-    };
-    assert!(!sees(false, false, 1), "no sensor at all");
-    assert!(sees(true, false, 20), "there never was a laser");
-    assert!(!sees(false, false, 1), "not even a frame without depth");
-    assert!(sees(true, true, 1));
-    assert!(sees(true, false, 4), "a scan is late");
-    assert!(!sees(true, false, 1), "the laser is silent");
-    assert!(sees(true, true, 1) && sees(false, true, 4));
-    assert!(!sees(false, true, 1), "the camera is silent");
+        assert_eq!(monitor.stop_reason(0.45).is_none(), sees, "{why}");
+    }
     let without = CollisionMonitorSettings {
         obstacles: ObstacleSource::None,
         ..CollisionMonitorSettings::default()

@@ -109,17 +109,17 @@ impl Orders {
     /// Returns the command in force as [`Orders::at`], in simulated time: `since_frame` is the time
     /// since the last frame that led to a command.
     pub fn after(&self, now: Stamp, since_frame: Duration) -> Command {
-        let until = now.plus_seconds(self.valid_s);
-        let stop = |reason| Command::new(Twist::STOP, WheelSpeeds::STOP, now, until, reason);
         let is_young = since_frame.as_secs_f64() <= self.valid_s;
-        match self.last {
-            _ if self.fault.is_some() => stop(Reason::Fault),
-            None => stop(Reason::Settling),
+        let reason = match self.last {
+            _ if self.fault.is_some() => Reason::Fault,
+            None => Reason::Settling,
             Some(last) if is_young && self.is_near(last.stamp, now) && now <= last.valid_until => {
-                last
+                return last;
             }
-            Some(_) => stop(Reason::Expired),
-        }
+            Some(_) => Reason::Expired,
+        };
+        let until = now.plus_seconds(self.valid_s);
+        Command::new(Twist::STOP, WheelSpeeds::STOP, now, until, reason)
     }
 
     fn is_near(&self, stamp: Stamp, now: Stamp) -> bool {
@@ -548,8 +548,8 @@ impl CommandLimiter {
         let WheelSpeeds { left, right } = self.wheels.wheels(twist);
         let scale = most / left.abs().max(right.abs()).max(most);
         // The clamp removes the rounding error of the scale.
-        let limit = |speed: f64| (speed * scale).clamp(-most, most);
-        WheelSpeeds { left: limit(left), right: limit(right) }
+        let [left, right] = [left, right].map(|speed| (speed * scale).clamp(-most, most));
+        WheelSpeeds { left, right }
     }
 }
 

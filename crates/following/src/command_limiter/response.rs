@@ -183,8 +183,7 @@ impl ResponseCheck {
         let count = self.motions.len() as f64;
         let first = self.commands.front()?.stamp;
         // Each delay is compared on the same motions.
-        let is_known = |at: &Stamp| at.seconds_since(first) >= LONGEST_S;
-        if !self.motions.iter().all(|(at, _)| is_known(at)) {
+        if !self.motions.iter().all(|(at, _)| at.seconds_since(first) >= LONGEST_S) {
             return None;
         }
         let mean = self.motions.iter().map(|(_, speed)| speed).sum::<f64>() / count;

@@ -153,8 +153,12 @@ fn each_emergency_stops_at_once() {
 
 /// Returns the commands of so many further frames, each with this wish but for the stamp.
 fn go_on(limiter: &mut CommandLimiter, wished: &Wish, frames: u64) -> Vec<Command> {
-    let next = |frame| Wish { stamp: wish(40 + frame, 0.0, 0.0).stamp, ..wished.clone() };
-    (0..frames).map(|frame| limiter.limit(&next(frame), free)).collect()
+    let mut commands = Vec::new();
+    for frame in 40..40 + frames {
+        let next = Wish { stamp: wish(frame, 0.0, 0.0).stamp, ..wished.clone() };
+        commands.push(limiter.limit(&next, free));
+    }
+    commands
 }
 
 #[test]
@@ -195,9 +199,10 @@ fn whoever_may_be_the_wrong_one_is_followed_at_half_speed() {
         let commands = go_on(&mut limiter, &Wish { aim, ..wish(0, 0.8, 0.8) }, 5);
         assert!(commands.iter().all(|command| command.reason == reason), "{commands:?}");
         assert!((commands[4].wheels.left - 0.45).abs() < 1e-9, "{commands:?}");
-        let slow = |frame| Wish { aim, ..wish(frame, 0.3, 0.3) };
-        assert_eq!(limiter.limit(&slow(45), free).reason, Reason::Limited);
-        assert_eq!(limiter.limit(&slow(46), free).reason, reason);
+        for (frame, reason) in [(45, Reason::Limited), (46, reason)] {
+            let slow = Wish { aim, ..wish(frame, 0.3, 0.3) };
+            assert_eq!(limiter.limit(&slow, free).reason, reason);
+        }
     }
 }
 
@@ -326,13 +331,16 @@ fn backwards_only_where_it_is_allowed() {
 #[test]
 fn commands_expire() {
     let (moving, command) = at_speed(0.5, 0.5);
-    let later = |seconds| moving.orders().at(command.stamp.plus_seconds(seconds));
-    assert_eq!(later(0.2), command);
-    assert_eq!((later(0.3).wheels, later(0.3).reason), (WheelSpeeds::STOP, Reason::Expired));
-    assert_eq!((later(-0.2), later(-0.3).reason), (command, Reason::Expired));
-    let aged = |ms| moving.orders().after(command.stamp, Duration::from_millis(ms));
-    assert_eq!(aged(249), command);
-    assert_eq!((aged(251).wheels, aged(251).reason), (WheelSpeeds::STOP, Reason::Expired));
+    let [later, too_late, earlier, too_early] = [0.2, 0.3, -0.2, -0.3]
+        .map(|seconds| moving.orders().at(command.stamp.plus_seconds(seconds)));
+    let [young, old] =
+        [249, 251].map(|ms| moving.orders().after(command.stamp, Duration::from_millis(ms)));
+    for order in [later, earlier, young] {
+        assert_eq!(order, command);
+    }
+    for order in [too_late, too_early, old] {
+        assert_eq!((order.wheels, order.reason), (WheelSpeeds::STOP, Reason::Expired));
+    }
     let nothing_yet = limiter().orders().at(Stamp::from_nanos(5));
     assert_eq!(nothing_yet.wheels, WheelSpeeds::STOP);
 }
@@ -385,45 +393,46 @@ fn while_it_speeds_up_the_robot_is_on_the_arc_that_was_wished_for() {
 
 #[test]
 fn each_path_is_looked_along_whatever_its_kind() {
-    let asked = |settings: CommandLimiterSettings, left, right| {
-        let asked = Cell::new(None);
-        limiter_of(settings).limit(&wish(1, left, right), |path, speed, _| {
-            asked.set(Some((path, speed)));
-            Allowance::FREE
-        });
-        asked.get()
-    };
-    let Some((Path::Arc { curvature, backwards: false }, speed)) = asked(abrupt(), 0.3, 0.4) else {
+    let arc = asked_way(abrupt(), 0.3, 0.4);
+    let Some((Path::Arc { curvature, backwards: false }, speed)) = arc else {
         panic!("an arc ahead");
     };
     assert!((curvature - 0.05 / DRIVE.half_separation_m / 0.35).abs() < 1e-9, "{curvature}");
     assert!((speed - 0.1).abs() < 1e-9, "the speed of this step: {speed}");
-    let turn = asked(abrupt(), -0.2, 0.2).map(|(path, _)| path);
+    let turn = asked_way(abrupt(), -0.2, 0.2).map(|(path, _)| path);
     assert_eq!(turn, Some(Path::Turn { left: true }));
     let reverse = CommandLimiterSettings { reverse: true, ..abrupt() };
-    let back = asked(reverse, -0.2, -0.2).map(|(path, _)| path);
+    let back = asked_way(reverse, -0.2, -0.2).map(|(path, _)| path);
     assert!(matches!(back, Some(Path::Arc { backwards: true, .. })), "{back:?}");
-    assert_eq!(asked(abrupt(), 0.0, 0.0), None, "a robot that stands sweeps nothing");
+    assert_eq!(asked_way(abrupt(), 0.0, 0.0), None, "a robot that stands sweeps nothing");
+}
+
+/// Returns the path and the speed that a limiter asks about for a wish.
+fn asked_way(settings: CommandLimiterSettings, left: f64, right: f64) -> Option<(Path, f64)> {
+    let asked = Cell::new(None);
+    limiter_of(settings).limit(&wish(1, left, right), |path, speed, _| {
+        asked.set(Some((path, speed)));
+        Allowance::FREE
+    });
+    asked.get()
 }
 
 #[test]
 fn a_turn_that_is_not_free_is_slower_or_none() {
-    let most = |most: f64| {
-        move |path: Path, _: f64, _: &Braking| match path {
-            Path::Turn { .. } => Allowance { gentle: most, most, ..Allowance::FREE },
-            Path::Arc { .. } => Allowance::FREE,
-        }
-    };
-    let turned = |allowed| {
+    let [free, slower, none] = [9.0, 0.5, 0.0].map(|most| {
         let mut limiter = limiter();
-        let commands = (1..40).map(|frame| limiter.limit(&wish(frame, -0.2, 0.2), most(allowed)));
+        let commands = (1..40).map(|frame| {
+            limiter.limit(&wish(frame, -0.2, 0.2), |path, _, _| match path {
+                Path::Turn { .. } => Allowance { gentle: most, most, ..Allowance::FREE },
+                Path::Arc { .. } => Allowance::FREE,
+            })
+        });
         commands.last().unwrap()
-    };
-    assert!((turned(9.0).twist.angular_rps - 0.2 / 0.167).abs() < 1e-9);
-    let slower = turned(0.5);
+    });
+    assert!((free.twist.angular_rps - 0.2 / 0.167).abs() < 1e-9);
     assert!((slower.twist.angular_rps - 0.5).abs() < 1e-9, "{slower:?}");
     assert_eq!(slower.reason, Reason::Obstacle);
-    assert_eq!((turned(0.0).wheels, turned(0.0).reason), (WheelSpeeds::STOP, Reason::Blocked));
+    assert_eq!((none.wheels, none.reason), (WheelSpeeds::STOP, Reason::Blocked));
 }
 
 #[test]
@@ -506,18 +515,22 @@ fn a_base_that_responds_late_is_slower_and_one_that_is_much_too_late_is_a_fault(
 
 #[test]
 fn of_several_limits_the_lowest_holds_and_is_named() {
-    let command = |aim, pause_s, at_m| {
+    for (aim, pause_s, at_m, reason, percent) in [
+        (Aim::Perhaps, 0.1, 2.0, Reason::Unsure, 70.0),
+        // Not a quarter.
+        (Aim::Perhaps, 0.3, 2.0, Reason::Slow, 70.0),
+        (Aim::Perhaps, 0.1, 0.45, Reason::Obstacle, 9.0),
+        (Aim::Person, 0.1, 0.7, Reason::Obstacle, 42.0),
+        // Just in time, and just not stopped.
+        (Aim::Person, 0.25, 2.0, Reason::Follow, 80.0),
+        (Aim::Person, 0.5, 2.0, Reason::Slow, 70.0),
+    ] {
         let (mut limiter, _) = at_speed(0.8, 0.8);
         let wish = Wish { aim, pause_s, ..wish(40, 0.8, 0.8) };
         let command = limiter.limit(&wish, something(at_m));
-        (command.reason, (command.wheels.left * 100.0).round())
-    };
-    assert_eq!(command(Aim::Perhaps, 0.1, 2.0), (Reason::Unsure, 70.0));
-    assert_eq!(command(Aim::Perhaps, 0.3, 2.0), (Reason::Slow, 70.0), "and not a quarter");
-    assert_eq!(command(Aim::Perhaps, 0.1, 0.45), (Reason::Obstacle, 9.0));
-    assert_eq!(command(Aim::Person, 0.1, 0.7), (Reason::Obstacle, 42.0));
-    assert_eq!(command(Aim::Person, 0.25, 2.0), (Reason::Follow, 80.0), "just in time");
-    assert_eq!(command(Aim::Person, 0.5, 2.0), (Reason::Slow, 70.0), "just not stopped");
+        let found = (command.reason, (command.wheels.left * 100.0).round());
+        assert_eq!(found, (reason, percent), "{wish:?}");
+    }
 }
 
 #[test]
@@ -532,13 +545,12 @@ fn a_pause_gives_no_licence_for_a_leap() {
 fn backwards_it_speeds_up_and_slows_down_as_it_does_ahead() {
     let settings = CommandLimiterSettings { reverse: true, ..abrupt() };
     let mut limiter = limiter_of(settings);
-    let mut speed = |frame, wished| limiter.limit(&wish(frame, wished, wished), free).wheels.left;
-    let faster: Vec<f64> = (1..4).map(|frame| speed(frame, -0.9)).collect();
-    for (found, expected) in faster.iter().zip([-0.1, -0.15, -0.2]) {
-        assert!((found - expected).abs() < 1e-9, "{faster:?}");
+    for (frame, wished, expected) in
+        [(1, -0.9, -0.1), (2, -0.9, -0.15), (3, -0.9, -0.2), (4, 0.0, -0.1)]
+    {
+        let found = limiter.limit(&wish(frame, wished, wished), free).wheels.left;
+        assert!((found - expected).abs() < 1e-9, "{frame}: {found}");
     }
-    let slower = speed(4, 0.0);
-    assert!((slower + 0.1).abs() < 1e-9, "{slower}");
 }
 
 #[test]

@@ -332,26 +332,24 @@ mod tests {
 
     #[test]
     fn without_a_rule_no_person_is_chosen_but_the_one_by_number() {
-        let none = TargetSettings { choose: ChoiceRule::None, ..TargetSettings::default() };
-        let tracks = [bystander()];
-        let chosen = |settings: &TargetSettings| {
-            Chooser::default().choose(settings, &tracks, &[], DT_S).map(|track| track.id.0)
-        };
-        assert_eq!(chosen(&none), None);
-        let numbered = TargetSettings { track: Some(2), ..none };
-        assert_eq!(chosen(&numbered), Some(2));
+        for track in [None, Some(2)] {
+            let choose = ChoiceRule::None;
+            let settings = TargetSettings { choose, track, ..TargetSettings::default() };
+            let tracks = [bystander()];
+            let chosen = Chooser::default().choose(&settings, &tracks, &[], DT_S);
+            assert_eq!(chosen.map(|track| track.id.0), track);
+        }
     }
 
     #[test]
     fn only_a_nearer_person_in_sight_is_taken_instead_of_the_chosen_one() {
         let settings = TargetSettings { reconsider_s: 5.0, ..TargetSettings::default() };
         let chosen = track(1, 2.5, 0.0, 0.0);
-        let instead = |seen: bool| {
+        // Who is not seen is predicted only.
+        for (seen, instead) in [(true, Some(2)), (false, None)] {
             let tracks = [chosen.clone(), track(2, 1.5, 0.0, 0.0).with_seen(seen)];
             let nearer = Chooser::default().reconsider(&settings, &chosen, &tracks, DT_S);
-            nearer.map(|track| track.id.0)
-        };
-        assert_eq!(instead(true), Some(2));
-        assert_eq!(instead(false), None, "predicted only");
+            assert_eq!(nearer.map(|track| track.id.0), instead);
+        }
     }
 }

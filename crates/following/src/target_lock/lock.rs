@@ -393,8 +393,10 @@ impl TargetLock {
         }
         let enough = logit(self.settings.again_from);
         let mut seen = BTreeMap::new();
-        let may_be = |track: &&Track| !self.is_other(track) && self.is_in_reach(track);
-        for track in tracks.iter().filter(may_be) {
+        for track in tracks {
+            if self.is_other(track) || !self.is_in_reach(track) {
+                continue;
+            }
             let Some(odds) = log_odds.get(&track.id) else { continue };
             let (before, times) = self.candidates.get(&track.id).copied().unwrap_or_default();
             // Evidence adds up, but consecutive frames are correlated.
@@ -471,25 +473,31 @@ impl TargetLock {
     /// Notes each track seen beside the person as another person, until that track is out of sight,
     /// or comes so near to the person's or to a new one that it may change over.
     fn tell_apart(&mut self, tracks: &[Track]) {
-        let is_own = |track: &Track| Some(track.id) == self.track;
         let is_sure = self.state.follows() && !self.state.doubts() && self.belief >= logit(SURE);
-        let own = tracks.iter().find(|track| is_own(track) && track.seen && is_sure);
-        let is_beside =
-            |track: &Track| own.is_some_and(|own| track.seen && self.are_apart(own, track));
-        let is_known = |track: &Track| self.others.contains(&track.id);
-        let may_be_taken = |track: &Track| {
-            let mut others = tracks.iter().filter(|t| is_own(t) || t.seen && !is_known(t));
-            others.any(|other| other.id != track.id && !self.are_apart(other, track))
-        };
-        let stay = tracks
-            .iter()
-            .filter(|track| is_known(track) && track.unseen_s <= UNSEEN_S && !may_be_taken(track))
+        let own = tracks.iter().find(|t| Some(t.id) == self.track && t.seen && is_sure);
+        let known = tracks.iter().filter(|t| self.others.contains(&t.id));
+        let stay = known
+            .filter(|track| track.unseen_s <= UNSEEN_S && !self.may_be_taken(track, tracks))
             .map(|track| track.id)
             .collect();
-        // Collected before `self.others` changes, because `is_known` reads it.
-        let beside: Vec<&Track> = tracks.iter().filter(|t| !is_own(t) && is_beside(t)).collect();
         self.others = stay;
-        beside.into_iter().for_each(|track| self.note_other(track));
+        let Some(own) = own else { return };
+        for track in tracks {
+            if Some(track.id) != self.track && track.seen && self.are_apart(own, track) {
+                self.note_other(track);
+            }
+        }
+    }
+
+    /// Says whether the track of another may have become that of somebody beside it: of the person,
+    /// or of somebody new.
+    fn may_be_taken(&self, track: &Track, tracks: &[Track]) -> bool {
+        tracks.iter().any(|other| {
+            let is_known = self.others.contains(&other.id);
+            (Some(other.id) == self.track || other.seen && !is_known)
+                && other.id != track.id
+                && !self.are_apart(other, track)
+        })
     }
 
     /// Learns the appearance of the person, and of others, while that is certain.

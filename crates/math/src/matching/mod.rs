@@ -53,9 +53,9 @@ impl Matcher {
         let order = std::mem::take(&mut self.order);
         let mut rest = &order[..];
         while let Some(&first) = rest.first() {
-            let root = self.parent[edges[first as usize].row as usize];
-            let same = |&e: &u32| self.parent[edges[e as usize].row as usize] == root;
-            let (group, others) = rest.split_at(rest.iter().take_while(|e| same(e)).count());
+            let root = group_of(&self.parent, edges, first);
+            let same = rest.iter().take_while(|&&e| group_of(&self.parent, edges, e) == root);
+            let (group, others) = rest.split_at(same.count());
             self.solve_group(rows, edges, group, matched);
             rest = others;
         }
@@ -168,9 +168,8 @@ impl Matcher {
             self.parent[node as usize] = self.root(node);
         }
         let parent = &self.parent;
-        let group_of = |&e: &u32| parent[edges[e as usize].row as usize];
-        if !self.order.is_sorted_by_key(group_of) {
-            self.order.sort_by_key(group_of);
+        if !self.order.is_sorted_by_key(|&e| group_of(parent, edges, e)) {
+            self.order.sort_by_key(|&e| group_of(parent, edges, e));
         }
     }
 
@@ -190,24 +189,27 @@ impl Matcher {
             matched.extend(heaviest(edges, group));
             return;
         }
-        let flipped = self.rows.len() > self.cols.len();
         let wide = self.rows.len().max(self.cols.len());
-        let place = |edge: &Edge, local: &[u32]| {
-            let r = local[edge.row as usize];
-            let c = local[edge.col as usize + rows];
-            if flipped { (c as usize, r as usize) } else { (r as usize, c as usize) }
-        };
         self.cost.clear();
         self.cost.resize(self.rows.len() * self.cols.len(), 0.0);
         for edge in group.iter().map(|&e| &edges[e as usize]) {
-            let (r, c) = place(edge, &self.local);
+            let (r, c) = self.place_in_group(edge, rows);
             self.cost[r * wide + c] = -edge.weight;
         }
         self.solver.solve(self.rows.len().min(self.cols.len()), wide, &self.cost);
         matched.extend(group.iter().filter(|&&e| {
-            let (r, c) = place(&edges[e as usize], &self.local);
+            let (r, c) = self.place_in_group(&edges[e as usize], rows);
             self.solver.row_of[c] == r as u32
         }));
+    }
+
+    /// Returns the row and the column of an edge in the matrix of its group, which is not higher
+    /// than wide.
+    #[inline]
+    fn place_in_group(&self, edge: &Edge, rows: usize) -> (usize, usize) {
+        let r = self.local[edge.row as usize] as usize;
+        let c = self.local[edge.col as usize + rows] as usize;
+        if self.rows.len() > self.cols.len() { (c, r) } else { (r, c) }
     }
 
     /// Numbers the rows and columns of a group from zero, in order of appearance.
@@ -219,6 +221,12 @@ impl Matcher {
             number(&mut self.local[edge.col as usize + rows], edge.col, &mut self.cols);
         }
     }
+}
+
+/// Returns the group of an edge, by the node that stands for it.
+#[inline]
+fn group_of(parent: &[u32], edges: &[Edge], edge: u32) -> u32 {
+    parent[edges[edge as usize].row as usize]
 }
 
 fn number(local: &mut u32, node: u32, list: &mut Vec<u32>) {

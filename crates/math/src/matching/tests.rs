@@ -70,22 +70,22 @@ proptest! {
     fn a_matrix_is_matched_as_well_by_its_groups_as_at_once(
         rows in 20usize..40, cols in 20usize..40, few in 1u64..40, seed in 0u64..1000,
     ) {
-        let weight = |i: usize| {
-            let mixed = (i as u64 + seed).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 20;
-            if mixed.is_multiple_of(few) { (mixed % 1009) as f64 + 1.0 } else { 0.0 }
-        };
-        let weights: Vec<f64> = (0..rows * cols).map(weight).collect();
+        let mut weights = vec![0.0; rows * cols];
+        for (i, weight) in (0..).zip(&mut weights) {
+            let mixed = (i + seed).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 20;
+            if mixed.is_multiple_of(few) {
+                *weight = (mixed % 1009) as f64 + 1.0;
+            }
+        }
         let mut groups = vec![None; rows];
         let mut whole = vec![None; rows];
         let mut matcher = Matcher::new();
         matcher.match_groups(rows, cols, &weights, &mut groups);
         matcher.match_all(rows, cols, &weights, &mut whole);
-        let sum = |of: &[Option<usize>]| -> f64 {
-            of.iter().enumerate().filter_map(|(row, col)| Some(weights[row * cols + (*col)?])).sum()
-        };
-        prop_assert_eq!(sum(&groups), sum(&whole));
+        let best = sum_of_matches(&whole, &weights, cols);
+        prop_assert_eq!(sum_of_matches(&groups, &weights, cols), best);
         let auto = matcher.best_of_matrix(rows, cols, &weights);
-        prop_assert_eq!(sum(&auto), sum(&whole));
+        prop_assert_eq!(sum_of_matches(&auto, &weights, cols), best);
     }
 
     /// Prices prove it: with all reduced costs at least 0, those of the pairs 0 and free columns
@@ -95,11 +95,12 @@ proptest! {
         rows in 1usize..40, more in 0usize..20, seed in 0u64..1000, levels in 2u64..100_000,
     ) {
         let cols = rows + more;
-        let mixed = |i: usize| {
-            let mixed = (i as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(seed);
-            (mixed ^ mixed >> 29).wrapping_mul(0xBF58_476D_1CE4_E5B9) >> 33
-        };
-        let cost: Vec<f64> = (0..rows * cols).map(|i| (mixed(i) % levels) as f64).collect();
+        let mut cost = Vec::new();
+        for i in 0..(rows * cols) as u64 {
+            let mixed = (i + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(seed);
+            let mixed = (mixed ^ mixed >> 29).wrapping_mul(0xBF58_476D_1CE4_E5B9) >> 33;
+            cost.push((mixed % levels) as f64);
+        }
         let mut solver = Solver::default();
         solver.solve(rows, cols, &cost);
         let Solver { row_price, col_price, row_of, .. } = solver;
@@ -115,6 +116,11 @@ proptest! {
             prop_assert!(col_price[col] <= 0.0 && (row_of[col] != NONE || col_price[col] == 0.0));
         }
     }
+}
+
+/// Sums the weights of the columns that the rows have got.
+fn sum_of_matches(found: &[Option<usize>], weights: &[f64], cols: usize) -> f64 {
+    found.iter().enumerate().filter_map(|(row, col)| Some(weights[row * cols + (*col)?])).sum()
 }
 
 #[test]

@@ -58,8 +58,10 @@ pub(super) fn velocity(
         .filter(|other| (other.place - me.place).norm() < NEIGHBOURS_M)
         .collect();
     // The first half planes win where arithmetic decides: those of near bodies.
-    let away = |other: &&Agent| (other.place - me.place).norm_squared();
-    others.sort_by(|a, b| away(a).total_cmp(&away(b)));
+    others.sort_by(|a, b| {
+        let [a, b] = [a, b].map(|other| (other.place - me.place).norm_squared());
+        a.total_cmp(&b)
+    });
     let margin_m = settings.safe_distance_m - settings.radius_m;
     planes.extend(others.iter().map(|other| reciprocal(me, other, margin_m, settings.horizon_s)));
     solve(&planes, standing, wanted, max_mps)

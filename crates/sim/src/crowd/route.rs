@@ -24,13 +24,13 @@ impl Blocks {
     /// Prepares ways that keep a margin from blocks, m.
     pub fn new(blocks: &[Block], room_m: [f64; 2], margin_m: f64) -> Self {
         let mut all = Self { blocks: blocks.to_vec(), room_m, margin_m, ..Self::default() };
-        let is_free = |corner: &Point2<f64>| {
+        for corner in blocks.iter().flat_map(|block| block.corners(margin_m + OFF_CORNER_M)) {
             let is_inside =
                 (0..2).all(|axis| (margin_m..room_m[axis] - margin_m).contains(&corner[axis]));
-            is_inside && blocks.iter().all(|block| block.gap_m(corner) > margin_m)
-        };
-        let corners = blocks.iter().flat_map(|block| block.corners(margin_m + OFF_CORNER_M));
-        all.corners = corners.filter(is_free).collect();
+            if is_inside && blocks.iter().all(|block| block.gap_m(&corner) > margin_m) {
+                all.corners.push(corner);
+            }
+        }
         all.reached = all.corners.iter().map(|corner| all.reached_from(corner)).collect();
         all
     }
@@ -59,11 +59,11 @@ impl Blocks {
         for block in &self.blocks {
             place = block.outside(&place, radius_m);
         }
-        let inside = |axis: usize| {
+        for axis in 0..2 {
             let most_m = self.room_m[axis] - radius_m;
-            place[axis].clamp(radius_m.min(most_m), most_m.max(radius_m))
-        };
-        Point2::new(inside(0), inside(1))
+            place[axis] = place[axis].clamp(radius_m.min(most_m), most_m.max(radius_m));
+        }
+        place
     }
 
     /// Returns true if no block is on the straight way between two points.
@@ -109,10 +109,12 @@ impl Blocks {
                 }
             }
         }
-        let whole_m = |(corner, rest_m): &(usize, f64)| lengths_m[*corner] + rest_m;
-        let best = last.iter().min_by(|a, b| whole_m(a).total_cmp(&whole_m(b)));
+        let best = last
+            .iter()
+            .map(|(corner, rest_m)| (*corner, lengths_m[*corner] + rest_m))
+            .min_by(|a, b| a.1.total_cmp(&b.1));
         let mut way = vec![*to];
-        let mut corner = best.filter(|best| whole_m(best).is_finite()).map(|best| best.0);
+        let mut corner = best.filter(|(_, whole_m)| whole_m.is_finite()).map(|best| best.0);
         while let Some(here) = corner {
             way.push(self.corners[here]);
             corner = before[here];

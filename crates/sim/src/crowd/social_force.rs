@@ -45,10 +45,11 @@ pub(super) fn between(me: &Agent, other: &Agent) -> Vector2<f64> {
     let angle_rad = along.perp(&towards).atan2(along.dot(&towards)) + SIDE_BIAS * reach_m;
     // The paper measured people of about 0.2 m; a wider body, like a robot, counts from farther.
     let away_m = (way.norm() - (other.radius_m - me.radius_m)).max(0.0);
-    let decay =
-        |factor: f64| STRENGTH * (-away_m / reach_m - (factor * reach_m * angle_rad).powi(2)).exp();
+    let [brake, turn] = [BRAKE_FACTOR, TURN_FACTOR].map(|factor| {
+        STRENGTH * (-away_m / reach_m - (factor * reach_m * angle_rad).powi(2)).exp()
+    });
     let left = Vector2::new(-along.y, along.x);
-    -along * decay(BRAKE_FACTOR) - left * angle_rad.signum() * decay(TURN_FACTOR)
+    -along * brake - left * angle_rad.signum() * turn
 }
 
 /// Returns the force of a wall whose nearest point is so far away, m/s².

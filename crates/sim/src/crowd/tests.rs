@@ -22,14 +22,12 @@ fn the_linear_program_is_as_good_as_trying_all_velocities() {
     let grid = grid(1.5);
     let mut impossible = 0;
     for _ in 0..200 {
-        let mut plane = |most: f64| {
+        // Things that stand always allow the velocity zero.
+        let planes = [0.0, 0.0, 0.7, 0.7, 0.7, 0.7, 0.7].map(|most| {
             let angle = random.between(0.0, std::f64::consts::TAU);
             let normal = Vector2::new(angle.cos(), angle.sin());
             HalfPlane { normal, least: random.between(-1.2, most) }
-        };
-        // Things that stand always allow the velocity zero.
-        let mut planes: Vec<HalfPlane> = (0..2).map(|_| plane(0.0)).collect();
-        planes.extend((0..5).map(|_| plane(0.7)));
+        });
         let wanted = Vector2::new(random.between(-1.5, 1.5), random.between(-1.5, 1.5));
         let found = solve(&planes, 2, wanted, 1.5);
         assert!(found.norm() <= 1.5 + 1e-6);
@@ -71,12 +69,11 @@ fn two_who_both_choose_do_not_touch_within_the_horizon() {
     let settings = CrowdSettings::default();
     let blocks = Blocks::new(&[], [100.0, 100.0], 0.4);
     for _ in 0..200 {
-        let mut agent = |x: f64| Agent {
+        let pair = [50.0, 52.0].map(|x| Agent {
             place: Point2::new(x, 50.0 + random.between(-2.0, 2.0)),
             velocity: Vector2::new(random.between(-1.0, 1.0), random.between(-1.0, 1.0)),
             radius_m: 0.3,
-        };
-        let pair = [agent(50.0), agent(52.0)];
+        });
         let chosen = [0, 1].map(|i| {
             let others = [pair[1 - i]];
             let around =

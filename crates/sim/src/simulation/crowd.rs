@@ -41,9 +41,8 @@ impl Simulation {
         for (i, (lead, others)) in ways.iter().enumerate().take(steps) {
             let walker = &mut self.walkers[i];
             if walker.reacts() {
-                let own = |j: usize| j == i;
                 let others: Vec<Agent> =
-                    (0..agents.len()).filter(|j| !own(*j)).filter_map(|j| agents[j]).collect();
+                    (0..agents.len()).filter(|j| *j != i).filter_map(|j| agents[j]).collect();
                 let around = Around {
                     others: &others,
                     obstacles: &self.obstacles[..furniture],

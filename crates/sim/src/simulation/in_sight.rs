@@ -37,13 +37,14 @@ impl Simulation {
             self.present().map(|(walker, id)| (id, walker.stance.place)).collect();
         let places: Vec<Point2<f64>> = people.iter().map(|(_, place)| *place).collect();
         let bodies_m = self.circumradius_m() + self.scene.reacting.radius_m;
-        let gap_m = |place: &Point2<f64>| (place - robot).norm() - bodies_m;
+        let gaps_m: Vec<f64> =
+            places.iter().map(|place| (place - robot).norm() - bodies_m).collect();
         let target = people.iter().position(|(id, _)| *id == 1);
-        let others = people.iter().filter(|(id, _)| *id != 1).map(|(_, place)| gap_m(place));
+        let others = people.iter().zip(&gaps_m).filter(|((id, _), _)| *id != 1);
         Some(CrowdView {
             world_from_robot: self.robot.pose,
-            target_gap_m: target.map(|target| gap_m(&places[target])),
-            others_gap_m: others.fold(f64::INFINITY, f64::min),
+            target_gap_m: target.map(|target| gaps_m[target]),
+            others_gap_m: others.map(|(_, gap_m)| *gap_m).fold(f64::INFINITY, f64::min),
             target_in_sight: target.is_some_and(|target| self.in_sight(&robot, &places)[target]),
             target_arrived: self.walkers.first().is_some_and(Walker::has_arrived),
         })
@@ -52,23 +53,26 @@ impl Simulation {
     /// Returns which of the people at these places in the world can be seen from a point: those within
     /// reach of the laser scanner of whom a part is hidden by no other, no block and no furniture.
     pub fn in_sight(&self, from: &Point2<f64>, places: &[Point2<f64>]) -> Vec<bool> {
+        (0..places.len()).map(|who| self.is_in_sight(from, places, who)).collect()
+    }
+
+    /// Says whether one of the people at these places can be seen from a point.
+    fn is_in_sight(&self, from: &Point2<f64>, places: &[Point2<f64>], who: usize) -> bool {
         let reach_m = self.scene.laser.as_ref().map_or(REACH_M, |laser| laser.max_range_m);
         let radius_m = self.scene.reacting.radius_m;
-        let is_seen = |(who, place): (usize, &Point2<f64>)| {
-            let way = place - from;
-            let Some(ahead) = way.try_normalize(1e-9) else { return true };
-            let side = Vector2::new(-ahead.y, ahead.x) * radius_m;
-            let is_free = |part: &f64| {
-                let to = place + side * *part;
+        let way = places[who] - from;
+        let Some(ahead) = way.try_normalize(1e-9) else { return true };
+        let side = Vector2::new(-ahead.y, ahead.x) * radius_m;
+        let is_near = way.norm() - radius_m <= reach_m;
+        is_near
+            && ASIDE.iter().any(|part| {
+                let to = places[who] + side * *part;
                 let bodies = places.iter().enumerate().filter(|(other, _)| *other != who);
                 let mut discs = bodies
                     .map(|(_, at)| (*at, radius_m))
                     .chain(self.obstacles.iter().map(|thing| (thing.at, thing.radius_m)));
                 !self.blocks.hides(from, &to) && !discs.any(|disc| is_between(disc, from, &to))
-            };
-            way.norm() - radius_m <= reach_m && ASIDE.iter().any(is_free)
-        };
-        places.iter().enumerate().map(is_seen).collect()
+            })
     }
 }
 
@@ -105,15 +109,19 @@ mod tests {
             Point2::new(x, y)
         }
 
-        let from = at(5.0, 5.0);
-        let seen = |more: &str, places: &[Point2<f64>]| simulation(more).in_sight(&from, places);
-        assert_eq!(seen("", &[at(8.0, 5.0), at(7.0, 5.0)]), [false, true], "behind another");
-        assert_eq!(seen("", &[at(8.0, 5.0), at(7.0, 5.4)]), [true, true], "partly behind");
-        assert_eq!(seen("", &[at(10.2, 5.0), at(10.4, 5.0), at(2.0, 5.0)]), [true, false, true]);
         let reach = "laser = { max_range_m = 2.0 }";
-        assert_eq!(seen(reach, &[at(8.0, 5.0), at(7.0, 5.0)]), [false, true]);
         let block = "blocks = [{ at = [6.5, 5.0], size_m = [0.2, 4.0] }]";
-        assert_eq!(seen(block, &[at(8.0, 5.0), at(5.0, 8.0)]), [false, true]);
+        for (more, places, in_sight) in [
+            // Behind another, and partly behind.
+            ("", vec![at(8.0, 5.0), at(7.0, 5.0)], vec![false, true]),
+            ("", vec![at(8.0, 5.0), at(7.0, 5.4)], vec![true, true]),
+            ("", vec![at(10.2, 5.0), at(10.4, 5.0), at(2.0, 5.0)], vec![true, false, true]),
+            (reach, vec![at(8.0, 5.0), at(7.0, 5.0)], vec![false, true]),
+            (block, vec![at(8.0, 5.0), at(5.0, 8.0)], vec![false, true]),
+        ] {
+            let found = simulation(more).in_sight(&at(5.0, 5.0), &places);
+            assert_eq!(found, in_sight, "{more} {places:?}");
+        }
     }
 
     #[test]

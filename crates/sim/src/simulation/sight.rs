@@ -1,6 +1,5 @@
 //! People in images, for the truth.
 
-use nalgebra::Isometry3;
 use tagalong_geometry::Rect;
 
 use crate::body::Skeleton;
@@ -17,9 +16,9 @@ pub(super) fn sight(
     skeleton: &Skeleton,
 ) -> (Option<Rect>, Visibility) {
     let camera = view.camera;
-    let square =
-        |pose: Isometry3<f64>| camera.upper_body(&pose.inverse_transform_point(&skeleton.head));
-    let whole = square(view.pose_at(square((view.pose)(0.5)).centre().y));
+    let head = (view.pose)(0.5).inverse_transform_point(&skeleton.head);
+    let pose = view.pose_at(camera.upper_body(&head).centre().y);
+    let whole = camera.upper_body(&pose.inverse_transform_point(&skeleton.head));
     let clipped = whole.clipped(camera.width, camera.height);
     if clipped.width < 2.0 || clipped.height < 2.0 {
         return (None, Visibility::default());

@@ -160,18 +160,16 @@ fn a_stereo_pair_is_shifted_by_the_disparity() {
     let images = &shots(&text, 2)[0].images;
     let left = images.grey.as_ref().unwrap();
     let right = &images.right.as_ref().unwrap().image;
-    let difference = |shift: i64| -> i64 {
-        let pairs = (44..52).flat_map(|x| (24..40).map(move |y| (x, y)));
-        pairs
-            .map(|(x, y)| {
-                let a = i64::from(left.get(x, y).unwrap());
-                (a - i64::from(right.get(x - shift, y).unwrap())).abs()
-            })
-            .sum()
-    };
-    let best = (0..8).min_by_key(|shift| difference(*shift)).unwrap();
+    let mut differences = [0; 8];
+    for (shift, difference) in (0..).zip(&mut differences) {
+        for (x, y) in (44..52).flat_map(|x| (24..40).map(move |y| (x, y))) {
+            let a = i64::from(left.get(x, y).unwrap());
+            *difference += (a - i64::from(right.get(x - shift, y).unwrap())).abs();
+        }
+    }
+    let best = (0..8).min_by_key(|shift| differences[*shift]).unwrap();
     // f = 86.6 px, depth 2.9 m.
-    assert_eq!(best, 4, "{:?}", (0..8).map(difference).collect::<Vec<_>>());
+    assert_eq!(best, 4, "{differences:?}");
 }
 
 #[test]
@@ -226,8 +224,8 @@ fn webcams_deliver_at_their_own_rates() {
         .iter()
         .filter_map(|event| if let Event::Webcam(shot) = event { Some(shot.webcam) } else { None })
         .collect();
-    let of = |number| numbers.iter().filter(|n| **n == number).count();
-    assert_eq!((of(0), of(1)), (3, 5));
+    let counts = [0, 1].map(|number| numbers.iter().filter(|n| **n == number).count());
+    assert_eq!(counts, [3, 5]);
 }
 
 #[test]
@@ -298,25 +296,21 @@ fn one_leaves_as_the_other_enters() {
 
 #[test]
 fn who_wanders_goes_elsewhere_with_every_seed_and_keeps_off_things() {
-    let ways = |seed: u64| {
+    let [first, again, second] = [4, 4, 5].map(|seed| {
         let text = TURNS.replace("seed = 4", &format!("seed = {seed}"));
         let scene = Scene::parse(&text).unwrap();
         let simulation = Simulation::new(&scene, 1);
-        let off = |at: &Point2<f64>| {
-            let things = simulation.obstacles.iter().map(|o| (at - o.at).norm() - o.radius_m);
-            things.fold((at - Point2::new(4.5, 3.0)).norm() - 0.55, f64::min)
-        };
         let people = walkers(&scene, &simulation.obstacles, &mut Random::new(seed, 3));
         let ways: Vec<Vec<Point2<f64>>> = people.iter().map(Walker::points).collect();
         for at in ways.iter().flatten() {
-            assert!(off(at) > 0.35, "{at}");
+            let things = simulation.obstacles.iter().map(|o| (at - o.at).norm() - o.radius_m);
+            let off = things.fold((at - Point2::new(4.5, 3.0)).norm() - 0.55, f64::min);
+            assert!(off > 0.35, "{at}");
             assert!((0.5..8.5).contains(&at.x) && (0.6..5.4).contains(&at.y), "{at}");
         }
         ways
-    };
-    let first = ways(4);
-    let second = ways(5);
-    assert_eq!(first, ways(4));
+    });
+    assert_eq!(first, again);
     assert!(first.iter().all(|way| way.len() == 30));
     assert!(first[0] != first[1] && first[0] != second[0]);
     // They come everywhere, near the robot and far from it.
@@ -328,20 +322,23 @@ fn who_wanders_goes_elsewhere_with_every_seed_and_keeps_off_things() {
 fn joints_are_where_the_body_is_and_know_what_hides_them() {
     let text = SMALL.replace("width = 96\nheight = 72", "width = 320\nheight = 240");
     let shot = shots(&text, 2).swap_remove(0);
-    let joint = |person: usize, name: &str| {
-        *shot.truth[person].joints.iter().find(|joint| joint.name == name).unwrap()
-    };
     // Both look away from the robot, and the second stands right behind the first.
-    let pixel = |name: &str| joint(0, name).pixel.unwrap();
-    let left = pixel("left_shoulder");
-    let right = pixel("right_shoulder");
+    let [left, right, hip, knee] = ["left_shoulder", "right_shoulder", "left_hip", "left_knee"]
+        .map(|name| joint_of(&shot, 0, name).pixel.unwrap());
     assert!(left.x < right.x - 10.0 && (left.y - right.y).abs() < 6.0, "{left} {right}");
-    assert!(pixel("left_hip").y > left.y && pixel("left_knee").y > pixel("left_hip").y);
-    assert!(joint(0, "left_shoulder").in_sight && joint(0, "right_knee").in_sight);
-    let hidden = joint(1, "left_shoulder");
+    assert!(hip.y > left.y && knee.y > hip.y);
+    for name in ["left_shoulder", "right_knee"] {
+        assert!(joint_of(&shot, 0, name).in_sight, "{name}");
+    }
+    let hidden = joint_of(&shot, 1, "left_shoulder");
     assert!(hidden.pixel.is_some() && !hidden.in_sight, "{hidden:?}");
-    let [first, second] = [0, 1].map(|person| joint(person, "right_hip").in_robot.x);
+    let [first, second] = [0, 1].map(|person| joint_of(&shot, person, "right_hip").in_robot.x);
     assert!((first - 3.0).abs() < 0.1 && (second - 5.0).abs() < 0.1, "{first} {second}");
+}
+
+/// Returns a joint of a person by its name.
+fn joint_of(shot: &Shot, person: usize, name: &str) -> Joint {
+    *shot.truth[person].joints.iter().find(|joint| joint.name == name).unwrap()
 }
 
 /// From behind, a body hides the wrist that is held before it.
@@ -349,12 +346,10 @@ fn joints_are_where_the_body_is_and_know_what_hides_them() {
 fn the_own_body_hides_a_joint_too() {
     let text = "seed = 4\nduration_s = 0.2\n[camera]\nwidth = 320\nheight = 240\n\
         [[people]]\npath = [[4.0, 3.0]]\nposture = \"phone\"\nextras = []\nheading_deg = ";
-    let in_sight = |degrees: u32| {
+    for (degrees, in_sight) in [(180, true), (20, false)] {
         let shot = shots(&format!("{text}{degrees}.0\n"), 1).swap_remove(0);
-        let joints = &shot.truth[0].joints;
-        joints.iter().find(|joint| joint.name == "right_wrist").unwrap().in_sight
-    };
-    assert!(in_sight(180) && !in_sight(20));
+        assert_eq!(joint_of(&shot, 0, "right_wrist").in_sight, in_sight, "{degrees}");
+    }
 }
 
 /// In a room whose floor the sun reaches, before and after it comes through the windows.
@@ -379,11 +374,8 @@ fn sunlight_makes_images_bright_and_takes_away_depth() {
     let lit = (0..160 * 120).filter(|i| bright.pixels()[*i][1] > 250 && dark.pixels()[*i][1] < 200);
     let lit: Vec<usize> = lit.collect();
     assert!(lit.len() > 300, "{} white pixels", lit.len());
-    let measured = |depth: &tagalong_core::DepthImage| {
-        lit.iter().filter(|i| !depth.pixels()[**i].is_nan()).count()
-    };
-    let before = measured(&all);
-    let after = measured(&left);
+    let [before, after] =
+        [&all, &left].map(|depth| lit.iter().filter(|i| !depth.pixels()[**i].is_nan()).count());
     assert!(before > 9 * lit.len() / 10 && after < lit.len() / 10, "{before} {after}");
     // The sky in a window is as bright as it is said to be, and a hole in the depth.
     let day = "seed = 4\nduration_s = 0.2\n[camera]\nwidth = 160\nheight = 120\n\

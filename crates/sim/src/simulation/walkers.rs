@@ -140,15 +140,15 @@ fn free_point(
     let [x, y] = scene.room.size_m;
     let robot = Point2::from(scene.robot.start);
     let [along, across] = area.parts;
-    let mut point = || {
+    // All are drawn, so that the next draw does not depend on which one is free.
+    let tries: [Point2<f64>; 30] = std::array::from_fn(|_| {
         let x = random.between(along[0], along[1]) * x;
         Point2::new(x, random.between(across[0], across[1]) * y)
-    };
-    let free = |at: &Point2<f64>| {
-        (at - robot).norm() > area.off_robot_m
-            && obstacles.iter().all(|o| (at - o.at).norm() > o.radius_m + 0.35)
-            && walkers.iter().all(|w| (at - w.stance.place).norm() > 1.0)
-    };
-    let tries: Vec<_> = (0..30).map(|_| point()).collect();
-    tries.iter().copied().find(free).unwrap_or(tries[0])
+    });
+    let free = tries.iter().find(|at| {
+        (*at - robot).norm() > area.off_robot_m
+            && obstacles.iter().all(|o| (*at - o.at).norm() > o.radius_m + 0.35)
+            && walkers.iter().all(|w| (*at - w.stance.place).norm() > 1.0)
+    });
+    *free.unwrap_or(&tries[0])
 }

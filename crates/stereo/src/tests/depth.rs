@@ -93,11 +93,11 @@ fn depth_out_of_range_is_none_and_counted() {
 #[test]
 fn bad_pairs_have_no_depth_and_the_reason_is_counted() {
     let (left, right) = noise_pair(320, 240, 10);
-    let plain = |value| GreyImage::filled(320, 240, value);
+    let [black, grey, white] = [0, 90, 255].map(|value| GreyImage::filled(320, 240, value));
     let cases = [
-        (plain(0), right.clone(), "stereo: image is black"),
-        (left.clone(), plain(255), "stereo: image is saturated"),
-        (plain(90), plain(90), "stereo: image without texture"),
+        (black, right.clone(), "stereo: image is black"),
+        (left.clone(), white, "stereo: image is saturated"),
+        (grey.clone(), grey, "stereo: image without texture"),
         (right.clone(), left.clone(), "stereo: left and right are swapped"),
     ];
     for (left, right, reason) in cases {
@@ -113,15 +113,14 @@ fn bad_pairs_have_no_depth_and_the_reason_is_counted() {
 #[test]
 fn cameras_of_unequal_gain_see_the_same_depth() {
     let (left, right) = noise_pair(160, 120, 10);
-    let brighter = |gain: f32| {
-        GreyImage::from_fn(160, 120, |x, y| (f32::from(right.row(y)[x]) * gain).round() as u8)
-    };
     let wanted = (FX * BASELINE_M / 10.0) as f32;
     for (method, gain, told) in
         [(Method::Block, 1.3, 1), (Method::Block, 0.7, 1), (Method::SemiGlobal, 1.1, 0)]
     {
         let settings = StereoSettings { method, ..StereoSettings::default() };
-        let (depth, funnel) = depth(settings, &frame(left.clone(), brighter(gain)));
+        let right =
+            GreyImage::from_fn(160, 120, |x, y| (f32::from(right.row(y)[x]) * gain).round() as u8);
+        let (depth, funnel) = depth(settings, &frame(left.clone(), right));
         let close = depth.pixels().iter().filter(|d| (**d - wanted).abs() < 0.05).count();
         assert!(close > 130 * 120, "{method:?} {gain}: {close}");
         assert_eq!(funnel.count("stereo: cameras differ in brightness"), told, "{gain}");
@@ -170,18 +169,20 @@ fn a_vertical_offset_is_measured_and_told() {
 fn what_is_missing_or_does_not_fit_is_an_error() {
     let (left, right) = noise_pair(64, 48, 3);
     let mut stereo = StereoDepth::new(StereoSettings::default()).unwrap();
-    let mut error =
-        |frame: &Frame| stereo.depth(frame, &mut Funnel::default()).unwrap_err().to_string();
     let whole = frame(left.clone(), right.clone());
-    let bare = |images| Frame::new(1, whole.stamp, Arc::clone(&whole.camera), whole.motion, images);
-    let only_left = Images { right: None, ..whole.images() };
-    assert!(error(&bare(only_left)).contains("needs right images"));
-    let only_right = Images { grey: None, ..whole.images() };
-    assert!(error(&bare(only_right)).contains("needs colour or grey images"));
-    assert!(error(&frame(left.clone(), GreyImage::filled(64, 47, 0))).contains("64x47"));
+    let low = frame(left, GreyImage::filled(64, 47, 0));
+    let mut cases = vec![
+        (Images { right: None, ..whole.images() }, "needs right images"),
+        (Images { grey: None, ..whole.images() }, "needs colour or grey images"),
+        (low.images(), "64x47"),
+    ];
     for baseline_m in [0.0, -0.1, f64::NAN] {
         let right = Some(Arc::new(RightImage { image: right.clone(), baseline_m }));
-        let frame = bare(Images { right, ..whole.images() });
-        assert!(error(&frame).contains("baseline"));
+        cases.push((Images { right, ..whole.images() }, "baseline"));
+    }
+    for (images, told) in cases {
+        let frame = Frame::new(1, whole.stamp, Arc::clone(&whole.camera), whole.motion, images);
+        let error = stereo.depth(&frame, &mut Funnel::default()).unwrap_err().to_string();
+        assert!(error.contains(told), "{error}");
     }
 }

@@ -42,10 +42,17 @@ pub fn blend(pair: &[GreyImage], noise: u8, x: i64, y: i64, d: i64) -> i64 {
 
 fn slope(image: &GreyImage, x: i64, y: i64) -> i64 {
     let x = x.clamp(0, image.width() as i64 - 1);
-    let at = |dx, dy| i64::from(clamped(image, x + dx, y + dy));
-    let sum: i64 =
-        [(-1, 1), (0, 2), (1, 1)].map(|(dy, w)| w * (at(1, dy) - at(-1, dy))).iter().sum();
-    (128 + sum.div_euclid(2)).clamp(0, 255)
+    (128 + weighted_rise(image, x, y).div_euclid(2)).clamp(0, 255)
+}
+
+/// Returns the horizontal sum of a Sobel filter.
+fn weighted_rise(image: &GreyImage, x: i64, y: i64) -> i64 {
+    let mut sum = 0;
+    for (dy, weight) in [(-1, 1), (0, 2), (1, 1)] {
+        let right = i64::from(clamped(image, x + 1, y + dy));
+        sum += weight * (right - i64::from(clamped(image, x - 1, y + dy)));
+    }
+    sum
 }
 
 /// Computes equations 1 to 3 of Birchfield and Tomasi, in integers.
@@ -55,16 +62,14 @@ fn dissimilarity(
     right: i64,
     level: impl Fn(&GreyImage, i64) -> i64,
 ) -> i64 {
-    let one_way = |image: &GreyImage, x: i64, own: i64| {
-        let centre = level(image, x);
+    let [l, r] = [(&pair[0], left), (&pair[1], right)].map(|(image, x)| level(image, x));
+    let ways = [(&pair[1], right, l, r), (&pair[0], left, r, l)].map(|(image, x, own, centre)| {
         let all = [centre, (centre + level(image, x - 1)) / 2, (centre + level(image, x + 1)) / 2];
-        let least = *all.iter().min().unwrap();
-        let most = *all.iter().max().unwrap();
+        let least = all.into_iter().fold(i64::MAX, i64::min);
+        let most = all.into_iter().fold(i64::MIN, i64::max);
         (own - most).max(least - own).max(0)
-    };
-    let l = level(&pair[0], left);
-    let r = level(&pair[1], right);
-    one_way(&pair[1], right, l).min(one_way(&pair[0], left, r))
+    });
+    ways[0].min(ways[1])
 }
 
 /// Fills holes along a row pixel by pixel.
@@ -131,18 +136,21 @@ pub fn path(
         (0..costs.height).flat_map(|y| (0..costs.width).map(move |x| (x, y))).collect();
     order.sort_by_key(|(x, y)| (*y, -dx.signum() * x));
     for (x, y) in order {
-        let before = |d| path.get(x + dx, y + dy, d);
-        let least = (0..costs.disparities).filter_map(before).min();
+        let before: Vec<Option<i64>> =
+            (-1..=costs.disparities).map(|d| path.get(x + dx, y + dy, d)).collect();
+        let least = before.iter().flatten().min();
         let own = clamped(grey, x, y);
         let jump = large(own.abs_diff(clamped(grey, x + dx, y + dy)));
-        let row: Vec<i64> = (0..costs.disparities)
-            .map(|d| {
+        let row: Vec<i64> = before
+            .windows(3)
+            .zip(0..)
+            .map(|(before, d)| {
                 let cost = costs.get(x, y, d).unwrap();
                 let Some(least) = least else { return cost };
                 let ways = [
-                    before(d),
-                    before(d - 1).map(|c| c + small),
-                    before(d + 1).map(|c| c + small),
+                    before[1],
+                    before[0].map(|c| c + small),
+                    before[2].map(|c| c + small),
                     Some(least + jump),
                 ];
                 cost + ways.into_iter().flatten().min().unwrap() - least
@@ -190,36 +198,44 @@ pub fn without_speckles(image: &[f32], width: usize, min_pixels: usize, step: f3
 
 /// Returns half of Sobel's sum across pixel `x` of row `y`.
 fn sobel(image: &GreyImage, x: i64, y: i64) -> u32 {
-    let at = |dx, dy| i64::from(clamped(image, x + dx, y + dy));
-    let sum: i64 =
-        [(-1, 1), (0, 2), (1, 1)].map(|(dy, w)| w * (at(1, dy) - at(-1, dy))).iter().sum();
-    (sum.unsigned_abs() / 2) as u32
+    (weighted_rise(image, x, y).unsigned_abs() / 2) as u32
 }
 
 /// Drops the smooth pixels of row `y` that differ from their textured neighbours, or
 /// have none on a side.
 pub fn supported(row: &[f32], image: &GreyImage, y: usize, least: u32) -> Vec<f32> {
+    let is_anchor: Vec<bool> = (0..row.len())
+        .map(|x| !row[x].is_nan() && sobel(image, x as i64, y as i64) >= least)
+        .collect();
+    (0..row.len())
+        .map(|x| {
+            if is_anchor[x] || agrees_with_anchors(row, &is_anchor, x) { row[x] } else { f32::NAN }
+        })
+        .collect()
+}
+
+/// Says whether a disparity is that of the surface between the next anchors on both sides.
+fn agrees_with_anchors(row: &[f32], is_anchor: &[bool], x: usize) -> bool {
     fn tolerance(d: f32) -> f32 {
         0.75_f32.max(0.1 * d)
     }
 
-    let is_anchor = |x: &usize| !row[*x].is_nan() && sobel(image, *x as i64, y as i64) >= least;
-    let keeps = |x: usize| {
-        let sides = ((0..x).rev().find(is_anchor), (x + 1..row.len()).find(is_anchor));
-        let (Some(a), Some(b)) = sides else { return false };
-        let far = row[a].min(row[b]);
-        let near = row[a].max(row[b]);
-        let middle = if near - far <= tolerance(far) { 0.5 * (row[a] + row[b]) } else { far };
-        (row[x] - middle).abs() <= tolerance(middle)
-    };
-    (0..row.len()).map(|x| if is_anchor(&x) || keeps(x) { row[x] } else { f32::NAN }).collect()
+    let before = (0..x).rev().find(|x| is_anchor[*x]);
+    let after = (x + 1..row.len()).find(|x| is_anchor[*x]);
+    let Some((a, b)) = before.zip(after) else { return false };
+    let far = row[a].min(row[b]);
+    let near = row[a].max(row[b]);
+    let middle = if near - far <= tolerance(far) { 0.5 * (row[a] + row[b]) } else { far };
+    (row[x] - middle).abs() <= tolerance(middle)
 }
 
 /// Returns brightness and slope of a smoothed row at `x`; its border is continued.
 fn smoothed(image: &GreyImage, x: i64, y: i64) -> (f64, f64) {
-    let at = |x: i64| f64::from(clamped(image, x, y));
-    let level = |x: i64| 0.25 * (at(x - 1) + 2.0 * at(x) + at(x + 1));
-    (level(x), 0.5 * (level(x + 1) - level(x - 1)))
+    let [before, own, after] = [x - 1, x, x + 1].map(|x| {
+        let [a, b, c] = [x - 1, x, x + 1].map(|x| f64::from(clamped(image, x, y)));
+        0.25 * (a + 2.0 * b + c)
+    });
+    (own, 0.5 * (after - before))
 }
 
 /// Returns slope, and slope times disparity, of a pixel as in Lucas and Kanade, with less weight on
@@ -246,13 +262,14 @@ fn matched(right: &GreyImage, x: usize, y: usize, d: f64) -> (f64, f64) {
 /// Returns the ratio of the deviations of a row's brightness in the two images.
 fn gain(pair: &[GreyImage], row: &[f32], y: usize) -> f64 {
     let known: Vec<usize> = (0..row.len()).filter(|x| !row[*x].is_nan()).collect();
-    let variance = |level: &dyn Fn(usize) -> f64| {
+    let left: Vec<f64> = known.iter().map(|x| smoothed(&pair[0], *x as i64, y as i64).0).collect();
+    let right: Vec<f64> =
+        known.iter().map(|x| matched(&pair[1], *x, y, row[*x].into()).0).collect();
+    let [left, right] = [left, right].map(|levels| {
         let n = known.len().max(1) as f64;
-        let mean = known.iter().map(|x| level(*x)).sum::<f64>() / n;
-        4.0 + known.iter().map(|x| (level(*x) - mean).powi(2)).sum::<f64>() / n
-    };
-    let left = variance(&|x| smoothed(&pair[0], x as i64, y as i64).0);
-    let right = variance(&|x| matched(&pair[1], x, y, row[x].into()).0);
+        let mean = levels.iter().sum::<f64>() / n;
+        4.0 + levels.iter().map(|level| (level - mean).powi(2)).sum::<f64>() / n
+    });
     (right / left).sqrt().clamp(0.5, 2.0)
 }
 
@@ -275,10 +292,10 @@ fn row_of_window(pair: &[GreyImage], row: &[f32], x: usize, y: usize, radius: us
 pub fn refined(pair: &[GreyImage], disparities: &[f32], radius: usize) -> Vec<f64> {
     let width = pair[0].width();
     let height = pair[0].height();
-    let one = |at: usize| {
+    let mut all = Vec::with_capacity(disparities.len());
+    for (at, &was) in disparities.iter().enumerate() {
         let x = at % width;
         let y = at / width;
-        let was = disparities[at];
         let mut squares = 20.0;
         let mut sum = 20.0 * f64::from(was);
         for y in y.saturating_sub(radius)..(y + radius + 1).min(height) {
@@ -290,38 +307,38 @@ pub fn refined(pair: &[GreyImage], disparities: &[f32], radius: usize) -> Vec<f6
         }
         let was = f64::from(was);
         let new = was + (sum / squares - was).clamp(-0.5, 0.5);
-        if new < 0.0 { 0.0 } else { new }
-    };
-    (0..disparities.len()).map(one).collect()
+        all.push(if new < 0.0 { 0.0 } else { new });
+    }
+    all
 }
 
 /// Returns the disparities of winners that pass the tests, and the numbers that fail: outside of
 /// the right image, not unique, contradicted from the right.
 pub fn judged(winners: &Winners, uniqueness: f32, tolerance: u8) -> (Vec<f32>, [u32; 3]) {
-    let d = |x: usize| usize::from(winners.disparity[x]);
+    let d: Vec<usize> = winners.disparity.iter().map(|d| usize::from(*d)).collect();
     let mut counts = [0; 3];
-    let mut one = |x: usize| {
+    let mut all = vec![f32::NAN; winners.cost.len()];
+    for x in 0..all.len() {
         let cost = f32::from(winners.cost[x]);
         let second = f32::from(winners.second[x]);
-        if d(x) > x {
+        if d[x] > x {
             counts[0] += 1;
-            return f32::NAN;
+            continue;
         }
         if (second - cost).max(0.0) < uniqueness * second {
             counts[1] += 1;
-            return f32::NAN;
+            continue;
         }
-        let rivals = (0..winners.cost.len()).filter(|other| *other + d(x) == x + d(*other));
+        let rivals = (0..all.len()).filter(|other| *other + d[x] == x + d[*other]);
         let best = rivals.min_by_key(|other| winners.cost[*other]).unwrap();
-        if d(best).abs_diff(d(x)) > usize::from(tolerance) {
+        if d[best].abs_diff(d[x]) > usize::from(tolerance) {
             counts[2] += 1;
-            return f32::NAN;
+            continue;
         }
         let below = f32::from(winners.below[x]);
         let above = f32::from(winners.above[x]);
         let rise = below + above - 2.0 * cost;
-        d(x) as f32 + if rise > 0.0 { 0.5 * (below - above) / rise } else { 0.0 }
-    };
-    let all = (0..winners.cost.len()).map(&mut one).collect();
+        all[x] = d[x] as f32 + if rise > 0.0 { 0.5 * (below - above) / rise } else { 0.0 };
+    }
     (all, counts)
 }

@@ -46,25 +46,25 @@ impl Keyframe {
         people: &[Point2<f64>],
     ) -> Self {
         let cell = settings.cell_px;
-        let cells = |size: usize| (0..size).step_by(cell);
         let width = images[0].width();
         let height = images[0].height();
         let eye = camera.robot_from_camera.translation.vector.xy().into();
-        // Points at a person and behind one are left out because outlines move with the person, and
-        // floor points near a person because of the shadow.
-        let stands_still = |point: &Point| {
-            let line = [eye, point.place.xy()];
-            let is_on_floor = point.place.z < FLOOR_M;
-            people.iter().all(|person| {
-                let apart = (point.place.xy() - person).norm();
-                distance_m(person, line) > settings.person_m
-                    && !(is_on_floor && apart < settings.shadow_m)
-            })
-        };
-        let points = cells(height)
-            .flat_map(|top| cells(width).map(move |left| (left, top)))
+        let corners = (0..height)
+            .step_by(cell)
+            .flat_map(|top| (0..width).step_by(cell).map(move |left| (left, top)));
+        let points = corners
             .filter_map(|corner| point(settings, camera, images, depth, corner))
-            .filter(stands_still)
+            // Points at a person and behind one are left out because outlines move with the person,
+            // and floor points near a person because of the shadow.
+            .filter(|point: &Point| {
+                let line = [eye, point.place.xy()];
+                let is_on_floor = point.place.z < FLOOR_M;
+                people.iter().all(|person| {
+                    let apart = (point.place.xy() - person).norm();
+                    distance_m(person, line) > settings.person_m
+                        && !(is_on_floor && apart < settings.shadow_m)
+                })
+            })
             .collect();
         Self { points }
     }
@@ -132,9 +132,9 @@ fn slopes(
     (left, top): (usize, usize),
     cell: usize,
 ) -> impl Iterator<Item = (usize, usize, f32)> {
-    let inner = |from: usize, size: usize| from.max(1)..(from + cell).min(size - 1);
-    let columns = inner(left, image.width());
-    inner(top, image.height()).flat_map(move |y| {
+    let columns = left.max(1)..(left + cell).min(image.width() - 1);
+    let rows = top.max(1)..(top + cell).min(image.height() - 1);
+    rows.flat_map(move |y| {
         let [above, here, below] = [y - 1, y, y + 1].map(|y| image.row(y));
         columns.clone().map(move |x| {
             let along = here[x + 1].abs_diff(here[x - 1]);
@@ -191,15 +191,15 @@ mod tests {
     #[test]
     fn a_shadow_walks_with_somebody_and_is_no_landmark() {
         let somebody = Point2::new(2.5, 1.2);
-        let nearest_m = |shadow_m: f64| {
+        let [shadowless, far] = [0.0, 1.5].map(|shadow_m| {
             let settings = OdometrySettings { shadow_m, ..OdometrySettings::default() };
             let points = points_of_floor(&settings, &[somebody], 1.0).points;
             assert!(points.len() > 8, "{}", points.len());
             let apart = points.iter().map(|point| (point.place.xy() - somebody).norm());
             apart.fold(f64::INFINITY, f64::min)
-        };
-        assert!(nearest_m(0.0) < 0.7, "{}", nearest_m(0.0));
-        assert!(nearest_m(1.5) > 1.5);
+        });
+        assert!(shadowless < 0.7, "{shadowless}");
+        assert!(far > 1.5, "{far}");
     }
 
     #[test]

@@ -40,16 +40,19 @@ impl Patch {
         if !(is_inside(x, image.width()) && is_inside(y, image.height())) {
             return None;
         }
-        let at = |x: usize, y: usize| f32::from(image.row(y)[x]);
-        let each = |value: &dyn Fn(usize, usize) -> f32| {
-            without_mean(std::array::from_fn(|i| value(x + i % SIDE - HALF, y + i / SIDE - HALF)))
-        };
-        let slopes = [
-            each(&|x, y| 0.5 * (at(x + 1, y) - at(x - 1, y))),
-            each(&|x, y| 0.5 * (at(x, y + 1) - at(x, y - 1))),
-        ];
+        let mut grey = [0.0; PIXELS];
+        let mut slopes = [[0.0; PIXELS]; 2];
+        for i in 0..PIXELS {
+            let x = x + i % SIDE - HALF;
+            let row = y + i / SIDE - HALF;
+            let [above, own, below] = [row - 1, row, row + 1].map(|y| image.row(y));
+            grey[i] = f32::from(own[x]);
+            slopes[0][i] = 0.5 * (f32::from(own[x + 1]) - f32::from(own[x - 1]));
+            slopes[1][i] = 0.5 * (f32::from(below[x]) - f32::from(above[x]));
+        }
+        let slopes = slopes.map(without_mean);
         let products = [(0, 0), (0, 1), (1, 1)].map(|(a, b)| dot(&slopes[a], &slopes[b]));
-        Some(Self { grey: each(&at), slopes, products })
+        Some(Self { grey: without_mean(grey), slopes, products })
     }
 
     /// Returns the variance of the brightness, grey levels squared.
@@ -126,7 +129,6 @@ mod tests {
 
     /// Interpolates between four pixels, one position after the other.
     fn slow_sample(image: &GreyImage, middle: Vector2<f64>) -> Vec<f64> {
-        let at = |x: f64, y: f64| f64::from(image.get(x as i64, y as i64).unwrap());
         let mut all = Vec::new();
         for row in -3..=3 {
             for column in -3..=3 {
@@ -136,10 +138,12 @@ mod tests {
                 let top = y.floor();
                 let a = x - left;
                 let b = y - top;
-                all.push(
-                    (1.0 - b) * ((1.0 - a) * at(left, top) + a * at(left + 1.0, top))
-                        + b * ((1.0 - a) * at(left, top + 1.0) + a * at(left + 1.0, top + 1.0)),
-                );
+                let [above, below] = [top, top + 1.0].map(|y| {
+                    let [l, r] = [left, left + 1.0]
+                        .map(|x| f64::from(image.get(x as i64, y as i64).unwrap()));
+                    (1.0 - a) * l + a * r
+                });
+                all.push((1.0 - b) * above + b * below);
             }
         }
         all

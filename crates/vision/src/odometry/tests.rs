@@ -44,26 +44,32 @@ fn paint(u: f64, v: f64) -> f64 {
 /// Renders the images of the camera.
 fn draw(world: World, robot: Isometry2<f64>) -> (GreyImage, DepthImage) {
     let camera = camera(world.nod);
-    let seen = |x: usize, y: usize| {
-        let eye = camera.robot_from_camera.translation.vector;
-        let pixel = Point2::new(x as f64, y as f64);
-        let ray = camera.back_project(pixel, 1.0).coords - eye;
-        let ahead = robot.rotation * ray.xy();
-        let place = |far: f64| robot.translation.vector + ahead * far;
-        let somebody = world.somebody.and_then(|at| {
-            let far = (at.x - robot.translation.x) / ahead.x;
-            let aside = place(far).y - at.y;
-            (far > 0.0 && aside.abs() < BODY_M).then_some((far, aside))
-        });
-        let wall = (WALL_M - robot.translation.x) / ahead.x;
-        match somebody.filter(|(far, _)| *far < wall) {
-            Some((far, aside)) => (far, paint(3.0 * aside, 3.0 * far * ray.z)),
-            None => (wall, world.contrast * paint(place(wall).y, wall * ray.z)),
-        }
-    };
-    let grey = GreyImage::from_fn(SIZE.0, SIZE.1, |x, y| (128.0 + 100.0 * seen(x, y).1) as u8);
-    let depth = DepthImage::from_fn(SIZE.0, SIZE.1, |x, y| seen(x, y).0 as f32);
+    let grey = GreyImage::from_fn(SIZE.0, SIZE.1, |x, y| {
+        (128.0 + 100.0 * seen_at([x, y], &camera, world, robot).1) as u8
+    });
+    let depth =
+        DepthImage::from_fn(SIZE.0, SIZE.1, |x, y| seen_at([x, y], &camera, world, robot).0 as f32);
     (grey, depth)
+}
+
+/// Returns the depth and the brightness of a pixel.
+fn seen_at([x, y]: [usize; 2], camera: &Camera, world: World, robot: Isometry2<f64>) -> (f64, f64) {
+    let eye = camera.robot_from_camera.translation.vector;
+    let ray = camera.back_project(Point2::new(x as f64, y as f64), 1.0).coords - eye;
+    let ahead = robot.rotation * ray.xy();
+    let somebody = world.somebody.and_then(|at| {
+        let far = (at.x - robot.translation.x) / ahead.x;
+        let aside = robot.translation.y + ahead.y * far - at.y;
+        (far > 0.0 && aside.abs() < BODY_M).then_some((far, aside))
+    });
+    let wall = (WALL_M - robot.translation.x) / ahead.x;
+    match somebody.filter(|(far, _)| *far < wall) {
+        Some((far, aside)) => (far, paint(3.0 * aside, 3.0 * far * ray.z)),
+        None => {
+            let along = robot.translation.y + ahead.y * wall;
+            (wall, world.contrast * paint(along, wall * ray.z))
+        }
+    }
 }
 
 fn frame(index: u64, world: World, robot: Isometry2<f64>) -> Frame {

@@ -32,6 +32,19 @@ fn memory() -> ObstacleMemory {
 }
 
 impl ObstacleMemory {
+    /// Returns what is straight ahead after a further image.
+    fn ahead_after(
+        &mut self,
+        depth: &DepthImage,
+        forward: f64,
+        target: Option<&Person>,
+    ) -> Option<Ahead> {
+        let settings = settings();
+        let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.1) };
+        self.update(&settings, &camera(), depth, &motion, target);
+        self.ahead(&settings, 0.0, None)
+    }
+
     /// Returns what is ahead on an arc, but for what belongs to the followed person.
     fn ahead(
         &self,
@@ -137,16 +150,10 @@ fn a_thing_beside_the_robot_is_in_the_way_of_a_bend() {
 #[test]
 fn people_are_not_remembered_and_what_is_gone_is_forgotten() {
     assert_eq!(approach(0.0, 1.5, 0.5, 8.0, true), Some(Ahead::Free));
-    let settings = settings();
     let mut surroundings = memory();
-    let mut look = |x| {
-        let depth = with_box(x, 0.0);
-        let still = EgoMotion::at_rest(0.1);
-        surroundings.update(&settings, &camera(), &depth, &still, None);
-        surroundings.ahead(&settings, 0.0, None)
-    };
-    assert!(is_at(look(1.5), 1.3));
-    assert_eq!(look(9.0), Some(Ahead::Free));
+    assert!(is_at(surroundings.ahead_after(&with_box(1.5, 0.0), 0.0, None), 1.3));
+    let gone = surroundings.ahead_after(&with_box(9.0, 0.0), 0.0, None);
+    assert_eq!(gone, Some(Ahead::Free));
 }
 
 /// A person gets up from a box and walks away, and the robot drives after them.
@@ -154,47 +161,45 @@ fn people_are_not_remembered_and_what_is_gone_is_forgotten() {
 fn what_the_person_sat_on_is_remembered_when_they_have_gone() {
     let settings = settings();
     let mut surroundings = memory();
-    let mut look = |x: f64, forward: f64, person: &Person| {
-        let depth = with_box(x, 0.0);
-        let still = EgoMotion::at_rest(0.1);
-        let motion = EgoMotion { forward, ..still };
-        surroundings.update(&settings, &camera(), &depth, &motion, Some(person));
-        surroundings.ahead(&settings, 0.0, Some(person.position.xy()))
-    };
+    let sitting = person(1.5, 0.0, 0.0);
     for _ in 0..WAIT {
-        assert_eq!(look(1.5, 0.0, &person(1.5, 0.0, 0.0)), Some(Ahead::Free), "it is theirs");
+        surroundings.ahead_after(&with_box(1.5, 0.0), 0.0, Some(&sitting));
+        let ahead = surroundings.ahead(&settings, 0.0, Some(sitting.position.xy()));
+        assert_eq!(ahead, Some(Ahead::Free), "it is theirs");
     }
     let gone = person(2.9, 0.0, 0.7);
-    assert!(is_at(look(1.5, 0.0, &gone), 1.3));
+    surroundings.ahead_after(&with_box(1.5, 0.0), 0.0, Some(&gone));
+    assert!(is_at(surroundings.ahead(&settings, 0.0, Some(gone.position.xy())), 1.3));
     for step in 1..=7 {
-        look(1.5 - 0.15 * f64::from(step), 0.15, &gone);
+        let depth = with_box(1.5 - 0.15 * f64::from(step), 0.0);
+        surroundings.ahead_after(&depth, 0.15, Some(&gone));
     }
-    let then = (0..60).map(|_| look(9.0, 0.0, &gone)).last();
-    assert!(is_at(then.flatten(), 0.25), "{then:?}");
+    for _ in 0..60 {
+        surroundings.ahead_after(&with_box(9.0, 0.0), 0.0, Some(&gone));
+    }
+    let then = surroundings.ahead(&settings, 0.0, Some(gone.position.xy()));
+    assert!(is_at(then, 0.25), "{then:?}");
 }
 
 /// The seat of a chair, whose back stands beside the path, is in view for two frames.
 #[test]
 fn a_low_part_of_what_stands_is_remembered_though_it_was_seen_briefly() {
-    let settings = settings();
-    let is_there = |with_back: bool| {
+    let nothing = with_box(9.0, 0.0);
+    for (back_m, is_there) in [(1.4, true), (9.0, false)] {
         let mut surroundings = memory();
-        let mut look = |depth: &DepthImage, forward: f64| {
-            let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.1) };
-            surroundings.update(&settings, &camera(), depth, &motion, None);
-            surroundings.ahead(&settings, 0.0, None) != Some(Ahead::Free)
-        };
-        let back = with_box(if with_back { 1.4 } else { 9.0 }, 0.6);
+        let back = with_box(back_m, 0.6);
         let seat = with_box_of(1.5, 0.3, 0.2);
         let both = DepthImage::from_fn(80, 60, |u, v| back.row(v)[u].min(seat.row(v)[u]));
-        let images = [vec![&back; WAIT], vec![&both; 2]].concat();
-        for image in images {
-            look(image, 0.0);
+        for image in [vec![&back; WAIT], vec![&both; 2]].concat() {
+            surroundings.ahead_after(image, 0.0, None);
         }
-        look(&with_box(9.0, 0.0), 0.45);
-        (0..60).map(|_| look(&with_box(9.0, 0.0), 0.0)).last()
-    };
-    assert_eq!((is_there(true), is_there(false)), (Some(true), Some(false)));
+        surroundings.ahead_after(&nothing, 0.45, None);
+        let mut then = None;
+        for _ in 0..60 {
+            then = surroundings.ahead_after(&nothing, 0.0, None);
+        }
+        assert_eq!(then != Some(Ahead::Free), is_there, "{back_m}: {then:?}");
+    }
 }
 
 /// A person with the head above the image crosses the path a metre before the robot: only the
@@ -220,38 +225,34 @@ fn who_walks_by_is_not_remembered() {
 /// A person steps close before the robot, and is out of the image at once.
 #[test]
 fn what_left_the_image_close_before_the_robot_is_there_until_it_is_seen_to_be_gone() {
-    let settings = settings();
     let mut surroundings = memory();
-    let mut look = |x, y, forward| {
-        let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.1) };
-        surroundings.update(&settings, &camera(), &with_box(x, y), &motion, None);
-        surroundings.ahead(&settings, 0.0, None)
-    };
-    look(0.75, 0.3, 0.0);
-    look(9.0, 0.0, 0.5);
-    let then: Vec<bool> = (0..600).map(|_| look(9.0, 0.0, 0.0) != Some(Ahead::Free)).collect();
-    assert!(then.iter().all(|there| *there), "{then:?}");
-    look(9.0, 0.0, -0.9);
-    assert_eq!(look(9.0, 0.0, 0.0), Some(Ahead::Free), "in view again, and nothing is there");
+    let nothing = with_box(9.0, 0.0);
+    surroundings.ahead_after(&with_box(0.75, 0.3), 0.0, None);
+    surroundings.ahead_after(&nothing, 0.5, None);
+    for step in 0..600 {
+        let then = surroundings.ahead_after(&nothing, 0.0, None);
+        assert_ne!(then, Some(Ahead::Free), "{step}");
+    }
+    surroundings.ahead_after(&nothing, -0.9, None);
+    let then = surroundings.ahead_after(&nothing, 0.0, None);
+    assert_eq!(then, Some(Ahead::Free), "in view again, and nothing is there");
 }
 
 /// A suitcase stands behind a person, and is gone with them when the robot is so near that it
 /// would be below the image; a box that a person walks past is not.
 #[test]
 fn what_stands_beside_whoever_stands_may_be_carried_away() {
-    let settings = settings();
     for (speed_mps, expected_m) in [(0.0, None), (0.6, Some(0.75))] {
         let mut surroundings = memory();
         let person = person(1.7, 0.3, speed_mps);
-        let mut look = |x: f64, forward, target: Option<&Person>| {
-            let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.1) };
-            let depth = with_box_of(x, 0.0, 0.2);
-            surroundings.update(&settings, &camera(), &depth, &motion, target);
-            surroundings.ahead(&settings, 0.0, None)
-        };
-        (0..WAIT).for_each(|_| _ = look(1.2, 0.0, Some(&person)));
-        let near = look(1.0, 0.2, None);
-        let gone = (0..60).fold(near, |_, _| look(9.0, 0.0, None));
+        for _ in 0..WAIT {
+            surroundings.ahead_after(&with_box_of(1.2, 0.0, 0.2), 0.0, Some(&person));
+        }
+        let near = surroundings.ahead_after(&with_box_of(1.0, 0.0, 0.2), 0.2, None);
+        let mut gone = near;
+        for _ in 0..60 {
+            gone = surroundings.ahead_after(&with_box_of(9.0, 0.0, 0.2), 0.0, None);
+        }
         match expected_m {
             None => assert_eq!(gone, Some(Ahead::Free), "{near:?}"),
             Some(metres) => assert!(is_at(gone, metres), "{gone:?}"),
@@ -263,27 +264,22 @@ fn what_stands_beside_whoever_stands_may_be_carried_away() {
 /// that the legs are gone too. A low box may still be there.
 #[test]
 fn who_stood_and_left_is_gone_down_to_the_feet() {
-    let settings = settings();
+    let camera = camera();
+    let empty = with_box(9.0, 0.0);
     for (top_m, is_gone) in [(1.4, true), (0.5, false)] {
-        let camera = camera();
-        let empty = with_box(9.0, 0.0);
-        let seen = |x: f64, stands: bool| {
+        let [far, near] = [1.6, 0.6].map(|x| {
             DepthImage::from_fn(80, 60, |u, v| {
                 let at = camera.back_project(Point2::new(u as f64, v as f64), x);
-                let hit = stands && at.y.abs() < 0.2 && 0.1 < at.z && at.z < top_m;
+                let hit = at.y.abs() < 0.2 && 0.1 < at.z && at.z < top_m;
                 if hit { x as f32 } else { empty.row(v)[u] }
             })
-        };
+        });
         let mut surroundings = memory();
-        let mut look = |x, forward, stands| {
-            let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.1) };
-            let depth = seen(x, stands);
-            surroundings.update(&settings, &camera, &depth, &motion, None);
-            surroundings.ahead(&settings, 0.0, None)
-        };
-        (0..WAIT).for_each(|_| _ = look(1.6, 0.0, true));
-        look(0.6, 1.0, true);
-        let left = look(0.6, 0.0, false);
+        for _ in 0..WAIT {
+            surroundings.ahead_after(&far, 0.0, None);
+        }
+        surroundings.ahead_after(&near, 1.0, None);
+        let left = surroundings.ahead_after(&empty, 0.0, None);
         assert_eq!(left == Some(Ahead::Free), is_gone, "{top_m}: {left:?}");
     }
 }
@@ -296,40 +292,39 @@ fn there(x: f64, y: f64) -> Track {
 fn whoever_stepped_before_the_robot_is_there_until_they_are_seen_elsewhere() {
     let settings = settings();
     let mut surroundings = memory();
-    let mut look = |forward, seen: Option<Track>, followed| {
-        let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.1) };
-        let depth = with_box(9.0, 0.0);
-        surroundings.update(&settings, &camera(), &depth, &motion, None);
+    let steps = [
+        (0.0, Some(there(0.6, 0.1)), None),
+        (0.3, None, None),
+        (0.0, Some(there(0.5, 0.9)), None),
+        (0.0, Some(there(0.3, 0.1)), None),
+        (0.0, Some(there(0.3, 0.1)), Some(TrackId(1))),
+    ];
+    let [_, near, elsewhere, _, followed] = steps.map(|(forward, seen, followed)| {
+        surroundings.ahead_after(&with_box(9.0, 0.0), forward, None);
         surroundings.add_tracks(seen.as_slice(), followed);
         surroundings.ahead(&settings, 0.0, None)
-    };
-    look(0.0, Some(there(0.6, 0.1)), None);
-    let near = look(0.3, None, None);
+    });
     assert!(matches!(near, Some(Ahead::Something(at)) if at < 0.2), "{near:?}");
-    assert_eq!(look(0.0, Some(there(0.5, 0.9)), None), Some(Ahead::Free));
-    look(0.0, Some(there(0.3, 0.1)), None);
-    assert_eq!(look(0.0, Some(there(0.3, 0.1)), Some(TrackId(1))), Some(Ahead::Free));
+    assert_eq!(elsewhere, Some(Ahead::Free));
+    assert_eq!(followed, Some(Ahead::Free));
 }
 
 /// A person steps in from the side, nearer than the camera measures.
 #[test]
 fn where_the_image_went_dark_from_top_to_bottom_somebody_stands() {
-    let settings = settings();
+    let seen = with_box(9.0, 0.0);
     let mut surroundings = memory();
-    let mut look =
-        |dark: std::ops::Range<usize>| {
-            let seen = with_box(9.0, 0.0);
+    let [border, somebody, gone, narrow] =
+        [0..20, 0..50, 0..20, 0..23].map(|dark| {
             let depth = DepthImage::from_fn(80, 60, |u, v| {
                 if dark.contains(&u) { f32::NAN } else { seen.row(v)[u] }
             });
-            let motion = EgoMotion::at_rest(0.1);
-            surroundings.update(&settings, &camera(), &depth, &motion, None);
-            surroundings.ahead(&settings, 0.0, None)
-        };
-    assert_eq!(look(0..20), Some(Ahead::Free), "a border that was always empty");
-    assert!(is_at(look(0..50), HIDES_M - 0.25));
-    assert_eq!(look(0..20), Some(Ahead::Free), "gone");
-    assert_eq!(look(0..23), Some(Ahead::Free), "too narrow");
+            surroundings.ahead_after(&depth, 0.0, None)
+        });
+    assert_eq!(border, Some(Ahead::Free), "a border that was always empty");
+    assert!(is_at(somebody, HIDES_M - 0.25), "{somebody:?}");
+    assert_eq!(gone, Some(Ahead::Free), "gone");
+    assert_eq!(narrow, Some(Ahead::Free), "too narrow");
 }
 
 /// The columns in the middle lose their depth: of a stereo pair that is an object where the image has
@@ -378,8 +373,9 @@ fn with_edge(edge_m: f64, drop_m: f64) -> DepthImage {
     DepthImage::from_fn(160, 120, |u, v| {
         // The camera is level and 1 m high: a ray falls by this much for each metre of depth.
         let falls = 1.0 - camera.back_project(Point2::new(u as f64, v as f64), 1.0).z;
-        let hits = |height_m: f64| if falls > 0.0 { height_m / falls } else { f64::INFINITY };
-        let floor_m = if hits(1.0) < edge_m { hits(1.0) } else { hits(1.0 + drop_m) };
+        let [upper_m, lower_m] = [1.0, 1.0 + drop_m]
+            .map(|height_m| if falls > 0.0 { height_m / falls } else { f64::INFINITY });
+        let floor_m = if upper_m < edge_m { upper_m } else { lower_m };
         floor_m.min(6.0) as f32
     })
 }
@@ -437,15 +433,15 @@ fn a_fall_that_was_seen_too_briefly_is_not_remembered() {
     });
     for (images, is_remembered) in [(2, false), (6, true)] {
         let mut surroundings = memory();
-        let mut look = |depth: &DepthImage| {
-            let still = EgoMotion::at_rest(0.1);
-            surroundings.update(&settings, &fine_camera(), depth, &still, None);
-            surroundings.ahead(&settings, 0.0, None)
-        };
+        let still = EgoMotion::at_rest(0.1);
         for _ in 0..images {
-            assert!(is_at(look(&fall), 1.4), "it counts at once");
+            surroundings.update(&settings, &fine_camera(), &fall, &still, None);
+            let ahead = surroundings.ahead(&settings, 0.0, None);
+            assert!(is_at(ahead, 1.4), "it counts at once: {ahead:?}");
         }
-        assert_eq!(look(&nothing) != Some(Ahead::Free), is_remembered, "{images}");
+        surroundings.update(&settings, &fine_camera(), &nothing, &still, None);
+        let ahead = surroundings.ahead(&settings, 0.0, None);
+        assert_eq!(ahead != Some(Ahead::Free), is_remembered, "{images}");
     }
 }
 
@@ -466,8 +462,8 @@ fn without_a_new_image_what_is_old_and_what_is_far_away_are_forgotten() {
 
 #[test]
 fn a_slope_is_the_mean_of_three_rows_of_which_the_middle_counts_twice() {
-    let image =
-        |differences: [u8; 3]| GreyImage::from_fn(3, 3, |x, y| differences[y] * (x / 2) as u8);
-    let slopes = [[8, 8, 8], [0, 20, 0], [20, 0, 0], [0, 0, 0]];
-    assert_eq!(slopes.map(|rows| slope_at(&image(rows), 1, 1)), [8, 10, 5, 0]);
+    for (differences, slope) in [([8, 8, 8], 8), ([0, 20, 0], 10), ([20, 0, 0], 5), ([0; 3], 0)] {
+        let image = GreyImage::from_fn(3, 3, |x, y| differences[y] * (x / 2) as u8);
+        assert_eq!(slope_at(&image, 1, 1), slope, "{differences:?}");
+    }
 }

@@ -39,10 +39,11 @@ impl Tape {
         let accel = (linear_mps - before.linear_mps) / dt;
         let turn = (angular_rps - before.angular_rps) / dt;
         let known = self.accels.replace([accel, turn]);
-        let within = |change: f64, jerk: f64| change.abs() <= jerk * dt + ROUNDING;
-        let smooth = known.is_none_or(|[then, _]| within(accel - then, settings.max_jerk_mps3));
-        let smooth_turn =
-            known.is_none_or(|[_, then]| within(turn - then, settings.max_turn_jerk_radps3));
+        let smooth = known
+            .is_none_or(|[then, _]| (accel - then).abs() <= settings.max_jerk_mps3 * dt + ROUNDING);
+        let smooth_turn = known.is_none_or(|[_, then]| {
+            (turn - then).abs() <= settings.max_turn_jerk_radps3 * dt + ROUNDING
+        });
         let gentle_turn = turn.abs() <= settings.max_turn_accel_radps2 + ROUNDING && smooth_turn;
         let gentle = accel <= settings.max_accel_mps2 + ROUNDING
             && -accel <= settings.max_decel_mps2 + ROUNDING
@@ -145,9 +146,8 @@ proptest! {
 
     #[test]
     fn a_mirrored_wish_gives_mirrored_wheels(wishes in prop::collection::vec((any_number(), any_number()), 20)) {
-        let new = || limiter_of(CommandLimiterSettings::default());
-        let mut one = new();
-        let mut other = new();
+        let mut one = limiter_of(CommandLimiterSettings::default());
+        let mut other = limiter_of(CommandLimiterSettings::default());
         for (frame, (left, right)) in wishes.into_iter().enumerate() {
             let a = one.limit(&wish(frame as u64, left, right), free).wheels;
             let b = other.limit(&wish(frame as u64, right, left), free).wheels;

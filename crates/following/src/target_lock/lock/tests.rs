@@ -146,13 +146,14 @@ fn nobody_is_farther_than_they_can_have_walked() {
     assert!(lock.is_in_reach(&somebody(1, 99.0, 0.0)), "seen nowhere before");
     let (place, velocity) = (Point2::new(1.0, 1.0), Vector2::zeros());
     lock.last = Some(LastSeen { place, velocity, ago_s: 1.0 });
-    let reaches = |off_m: f64, variance: f64| {
+    // 0.6 m and 2 m/s, and three times 0.2 m.
+    for (off_m, variance, is_in_reach) in
+        [(2.59, 0.0, true), (2.61, 0.0, false), (3.19, 0.02, true), (3.21, 0.02, false)]
+    {
         let mut track = somebody(1, 1.0, 1.0 + off_m);
         track.estimate.covariance = SMatrix::identity() * variance;
-        lock.is_in_reach(&track)
-    };
-    assert!(reaches(2.59, 0.0) && !reaches(2.61, 0.0), "0.6 m and 2 m/s");
-    assert!(reaches(3.19, 0.02) && !reaches(3.21, 0.02), "three times 0.2 m");
+        assert_eq!(lock.is_in_reach(&track), is_in_reach, "{off_m}");
+    }
 }
 
 #[test]
@@ -241,8 +242,8 @@ fn the_appearance_is_learned_without_doubt_alone() {
 #[test]
 fn a_track_that_was_out_of_sight_teaches_nothing_at_first() {
     let (mut lock, _) = missed(3);
-    let mut off_m = || step(&mut lock, &[tall(1.63)]).likeness[0].differences.height_m;
-    let first: Vec<f64> = (0..5).map(|_| off_m()).collect();
-    assert!(first.iter().all(|off_m| (off_m - 0.03).abs() < 1e-9), "{first:?}");
-    assert!((0..9).map(|_| off_m()).last().unwrap() < 0.025, "then it is learned again");
+    let off_m: [f64; 14] =
+        std::array::from_fn(|_| step(&mut lock, &[tall(1.63)]).likeness[0].differences.height_m);
+    assert!(off_m[..5].iter().all(|off_m| (off_m - 0.03).abs() < 1e-9), "{off_m:?}");
+    assert!(off_m[13] < 0.025, "then it is learned again: {off_m:?}");
 }

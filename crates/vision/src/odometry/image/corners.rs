@@ -23,9 +23,9 @@ pub(super) fn corners(levels: &[GreyImage], settings: &OdometrySettings) -> Vec<
         [] => return Vec::new(),
     };
     let cell = (settings.cell_px / size).max(STRIDE);
-    let cells = |side: usize| (0..side).step_by(cell);
-    let corners = cells(image.height())
-        .flat_map(|top| cells(image.width()).map(move |left| (left, top)))
+    let corners = (0..image.height())
+        .step_by(cell)
+        .flat_map(|top| (0..image.width()).step_by(cell).map(move |left| (left, top)))
         .filter_map(|corner| corner_of_cell(image, corner, cell, settings.min_slope));
     // The patch around a full pixel starts at an even one.
     corners.map(|(x, y)| Point2::new((size * x) as f64, (size * y) as f64)).collect()
@@ -41,9 +41,8 @@ fn corner_of_cell(
     // The mean over a patch is less than the slope of an edge in it.
     let mut most = PIXELS as f64 * (MEAN_SLOPE * min_slope).powi(2);
     let mut best = None;
-    let places = |from: usize, side: usize| (from..(from + cell).min(side)).step_by(STRIDE);
-    for y in places(top, image.height()) {
-        for x in places(left, image.width()) {
+    for y in (top..(top + cell).min(image.height())).step_by(STRIDE) {
+        for x in (left..(left + cell).min(image.width())).step_by(STRIDE) {
             let Some(patch) = Patch::new(image, x, y) else { continue };
             let least = least_change(patch.products);
             if least > most {

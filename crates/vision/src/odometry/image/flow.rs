@@ -133,8 +133,9 @@ mod tests {
         let j = (y / 16.0).floor();
         let across = smooth(x / 16.0 - i);
         let down = smooth(y / 16.0 - j);
-        let row = |j: f64| knot(i, j) + across * (knot(i + 1.0, j) - knot(i, j));
-        row(j) + down * (row(j + 1.0) - row(j))
+        let [above, below] =
+            [j, j + 1.0].map(|j| knot(i, j) + across * (knot(i + 1.0, j) - knot(i, j)));
+        above + down * (below - above)
     }
 
     fn image(dx: f64, dy: f64) -> GreyImage {

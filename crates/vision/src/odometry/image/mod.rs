@@ -122,26 +122,38 @@ impl View {
         settings: &OdometrySettings,
     ) -> Option<SwingFit> {
         let Lens::Pinhole(lens) = &self.nominal.lens else { return None };
-        let near = AGREES * self.nominal.width as f64 / lens.fx;
-        let ray = |at: Point2<f64>| self.nominal.ray(at).xy();
+        let agrees = AGREES * self.nominal.width as f64 / lens.fx;
         let people: Vec<Rect> = people.iter().map(|person| outline(&person.region)).collect();
         let from: Vec<Point2<f64>> = corners(&self.levels, settings)
             .into_iter()
             .filter(|at| people.iter().all(|person| !holds(person, at)))
             .collect();
-        let fit = |guess: Vector2<f64>| {
-            let found = |at: &Point2<f64>| track(&self.levels, &next.levels, *at, guess);
-            let pairs = from.iter().filter_map(|at| Some([ray(*at), ray(found(at)?)]));
-            let pairs: Vec<Pair> = pairs.collect();
-            SwingFit::of_agreeing(&pairs, near, settings.min_points)
-        };
-        let near = fit(Vector2::zeros());
+        let least = (agrees, settings.min_points);
+        let near = self.fit_around(next, &from, Vector2::zeros(), least);
         if near.is_some_and(|fit| fit.points as f64 >= MOST * from.len() as f64) {
             return near.map(|fit| self.without_noise(fit));
         }
         // A jerk moves corners farther than a patch shows; whole images are compared then.
-        let far = fit(whole_shift(&self.levels, &next.levels));
+        let shift = whole_shift(&self.levels, &next.levels);
+        let far = self.fit_around(next, &from, shift, least);
         near.into_iter().chain(far).reduce(|a, b| if b.points > a.points { b } else { a })
+    }
+
+    /// Fits the motion of corners that are looked for around a guess.
+    fn fit_around(
+        &self,
+        next: &Self,
+        corners: &[Point2<f64>],
+        guess: Vector2<f64>,
+        (agrees, min_points): (f64, usize),
+    ) -> Option<SwingFit> {
+        let mut pairs: Vec<Pair> = Vec::new();
+        for corner in corners {
+            if let Some(found) = track(&self.levels, &next.levels, *corner, guess) {
+                pairs.push([*corner, found].map(|at| self.nominal.ray(at).xy()));
+            }
+        }
+        SwingFit::of_agreeing(&pairs, agrees, min_points)
     }
 
     /// Returns a fit without a motion that is less than its errors: they would shake the tracks of a

@@ -140,8 +140,8 @@ impl SwingFit {
         let variance = left / (2.0 * count as f64 - 4.0).max(1.0);
         let (matrix, _) = swing.equations(agreeing.iter().copied());
         let covariance = matrix.try_inverse()? * variance;
-        let sigma = |at: usize| covariance[(at, at)].max(0.0).sqrt();
-        Some(Self { swing, sigma_pan: sigma(1), sigma_zoom: sigma(3), points: count })
+        let [sigma_pan, sigma_zoom] = [1, 3].map(|at| covariance[(at, at)].max(0.0).sqrt());
+        Some(Self { swing, sigma_pan, sigma_zoom, points: count })
     }
 }
 
@@ -229,8 +229,8 @@ mod tests {
         let found = SwingFit::of_agreeing(&pairs, NEAR, 12).unwrap();
         assert_eq!(found.points, 36);
         assert!((found.swing.zoom - 1.02).abs() < 1e-7, "{found:?}");
-        let least = |least| SwingFit::of_agreeing(&pairs, NEAR, least).is_some();
-        assert!(least(36) && !least(37));
+        assert!(SwingFit::of_agreeing(&pairs, NEAR, 36).is_some());
+        assert!(SwingFit::of_agreeing(&pairs, NEAR, 37).is_none());
         let mut random = SplitMix64::new(7);
         let noise: Vec<Pair> = rays()
             .map(|at| [at, Vector2::new(random.between(-0.6, 0.6), random.between(-0.5, 0.5))])

@@ -162,15 +162,15 @@ fn an_image_that_goes_down_is_a_camera_that_nods_up_and_returns() {
     let expected = 0.03;
     assert!((pitch(&moved) - expected).abs() < 1e-3, "{}", pitch(&moved));
     assert!(moved.motion.unwrap().turn.abs() < 1e-3, "{moved:?}");
-    let long = |frames: usize| {
+    for frames in [1, 4] {
         let settings = OdometrySettings { settle_s: 0.2, ..settings() };
         let held = std::iter::repeat_n(image(nod, 1.0), frames);
-        pitch(&seen(settings, &[vec![image(STRAIGHT, 1.0)], held.collect()].concat()).0)
-    };
-    // 0.1 s after the nod it has gone back by 1 - exp(-1/2), and so on.
-    let gone = |frames: i32| (expected - 0.05) * (-0.5 * f64::from(frames)).exp();
-    assert!((long(1) - 0.05 - gone(1)).abs() < 1e-3, "{}", long(1));
-    assert!((long(4) - 0.05 - gone(4)).abs() < 1e-3, "{}", long(4));
+        let held = [vec![image(STRAIGHT, 1.0)], held.collect()].concat();
+        let pitch = pitch(&seen(settings, &held).0);
+        // 0.1 s after the nod it has gone back by 1 - exp(-1/2), and so on.
+        let left = (expected - 0.05) * (-0.5 * frames as f64).exp();
+        assert!((pitch - 0.05 - left).abs() < 1e-3, "{pitch}");
+    }
 }
 
 #[test]
@@ -193,14 +193,14 @@ fn a_person_who_is_known_is_left_out() {
     let position = Point3::new(2.0, 0.0, 1.6);
     let person = Person { position, velocity: Vector2::zeros() };
     let covariance = SMatrix::identity();
-    let known = |region| Estimate::new(person, covariance, region);
-    let shift = |people: &[Estimate]| {
-        let settings = OdometrySettings { cell_px: 16, ..OdometrySettings::default() };
-        let found = views[0].compared(&views[1], people, &settings);
-        found.map(|found| 300.0 * found.swing.apply(Vector2::zeros()).x)
-    };
-    assert!(shift(&[known(at(30.0))]).unwrap().abs() < 0.2);
-    assert!(shift(&[]).unwrap() > 5.0, "the person would be taken for the room");
+    let known = Estimate::new(person, covariance, at(30.0));
+    let settings = OdometrySettings { cell_px: 16, ..OdometrySettings::default() };
+    let [without, with] = [vec![known], vec![]].map(|people| {
+        let found = views[0].compared(&views[1], &people, &settings).unwrap();
+        300.0 * found.swing.apply(Vector2::zeros()).x
+    });
+    assert!(without.abs() < 0.2, "{without}");
+    assert!(with > 5.0, "the person would be taken for the room: {with}");
 }
 
 #[test]
