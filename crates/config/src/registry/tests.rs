@@ -289,6 +289,6 @@ fn a_model_is_the_built_in_one_or_that_of_the_file() {
 }
 
 /// A model that is the first line of its file.
-fn first_line(text: &str) -> Result<String, String> {
+fn first_line(text: &str) -> std::result::Result<String, String> {
     text.lines().next().map(str::to_owned).ok_or("empty".to_owned())
 }
