@@ -142,8 +142,8 @@ fn score(
     dropped: &DroppedPlaces,
     result: &mut TaskResult,
 ) -> Result<(), String> {
-    let mut image = measured(sequence, truth, dropped, Similarity::Iou)?;
-    let metres = measured(sequence, truth, dropped, Similarity::Metres)?;
+    let mut image = measure_in(sequence, truth, dropped, Similarity::Iou)?;
+    let metres = measure_in(sequence, truth, dropped, Similarity::Metres)?;
     result.image = image.as_ref().map(|measured| measured.tally.scores());
     result.metres = metres.as_ref().map(|measured| measured.tally.scores());
     if let Some(measured) = &mut image {
@@ -163,7 +163,7 @@ struct Measured {
 }
 
 /// Compares in the image or on the floor, where the truth has that. People are missed in the image.
-fn measured(
+fn measure_in(
     sequence: &Sequence,
     truth: &TruthFile,
     dropped: &DroppedPlaces,

@@ -81,7 +81,8 @@ fn complaints(table: &Table, read: impl Fn(&str) -> Option<String>) -> Vec<Strin
 /// Reason of tests that the command for all tests leaves out and `.ci/run` has beside the lints.
 const RUN_BY_CI: &str = "#[ignore = \"waits for messages";
 
-/// Returns true if the file has a test of that name which is not switched off.
+/// Returns true if the file has a test of that name which is not switched off; nothing where there
+/// is no such function.
 fn exists(test: &str, read: impl Fn(&str) -> Option<String>) -> Option<bool> {
     let (file, name) = test.split_once(": ")?;
     let text = read(file)?;

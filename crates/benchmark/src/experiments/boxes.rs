@@ -131,16 +131,16 @@ pub fn boxes(args: &BoxesArgs, registry: &Registry) -> Outcome {
     for contestant in &contestants {
         let shipped = vec![contestant.shipped; sequences.len()];
         let tracked = bench.track(contestant, &shipped)?;
-        details.push(bench.written(contestant.name.clone(), tracked)?);
+        details.push(bench.keep_tracks(contestant.name.clone(), tracked)?);
         if args.leave_one_out {
             let (choice, figures) = bench.choose(contestant)?;
             let without: Vec<usize> =
                 bench.places.iter().map(|place| choice.without[*place]).collect();
             let tracked = bench.track(contestant, &without)?;
-            details.push(bench.written(format!("{}-left-out", contestant.name), tracked)?);
+            details.push(bench.keep_tracks(format!("{}-left-out", contestant.name), tracked)?);
             let with_all = vec![choice.with_all; sequences.len()];
             let tracked = bench.track(contestant, &with_all)?;
-            details.push(bench.written(format!("{}-with-all", contestant.name), tracked)?);
+            details.push(bench.keep_tracks(format!("{}-with-all", contestant.name), tracked)?);
             notes.push(format!("{}: {figures} settings tried.", contestant.name));
             notes.extend(bench.words(contestant, &choice));
         }
@@ -219,8 +219,8 @@ impl Bench<'_> {
         words
     }
 
-    /// Writes the tracks of a pipeline, where that is asked for, and names them.
-    fn written(
+    /// Writes the tracks of a pipeline, where that is asked for, and keeps them with its name.
+    fn keep_tracks(
         &self,
         name: String,
         tracked: Vec<Tracked>,

@@ -45,7 +45,7 @@ impl Home {
     }
 
     /// Plans with these arguments and returns the hashes of the tasks.
-    fn hashes(&self, out: &str, arguments: &[&str]) -> Vec<Value> {
+    fn task_hashes(&self, out: &str, arguments: &[&str]) -> Vec<Value> {
         ok(self
             .bench(&[&["plan", "--logs", "logs/short.mcap", "-o", out][..], arguments].concat()));
         self.plan(out).iter().map(|task| task["hash"].clone()).collect()
@@ -294,16 +294,19 @@ fn a_pipeline_that_can_detect_nothing_is_skipped_with_the_reason_that_run_gives(
 #[test]
 fn a_hash_changes_with_what_matters_and_with_nothing_else() {
     let home = Home::new();
-    let first = home.hashes("a", &[]);
+    let first = home.task_hashes("a", &[]);
     let path = home.path("configs/near.toml");
     let config = fs::read_to_string(&path).unwrap();
     fs::write(&path, format!("# a comment\n{config}")).unwrap();
-    assert_eq!(home.hashes("b", &[]), first, "a comment changes nothing");
+    assert_eq!(home.task_hashes("b", &[]), first, "a comment changes nothing");
     fs::write(&path, config.replace("seed = 7", "seed = 8")).unwrap();
-    let seeded = home.hashes("c", &[]);
+    let seeded = home.task_hashes("c", &[]);
     assert_eq!((&seeded[0], seeded[1] != first[1]), (&first[0], true), "far, then near");
     fs::write(home.path("logs/short.people.csv"), crate::common::people(8)).unwrap();
-    assert!(home.hashes("d", &[]).iter().zip(&seeded).all(|(new, old)| new != old), "other truth");
+    assert!(
+        home.task_hashes("d", &[]).iter().zip(&seeded).all(|(new, old)| new != old),
+        "other truth"
+    );
 }
 
 #[test]
@@ -314,7 +317,7 @@ fn files_that_a_config_names_belong_to_the_hash() {
     fs::write(home.path("configs/boxes.toml"), config).unwrap();
     let [first, same, other] = [("a", "0.9"), ("b", "0.9"), ("c", "0.8")].map(|(out, score)| {
         fs::write(home.path("det.txt"), format!("1,-1,90,40,26,79,{score}\n")).unwrap();
-        home.hashes(out, &["--configs", "configs/boxes.toml"])
+        home.task_hashes(out, &["--configs", "configs/boxes.toml"])
     });
     assert_eq!(same[0], first[0]);
     assert_ne!(other[0], first[0]);

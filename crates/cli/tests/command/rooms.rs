@@ -64,7 +64,7 @@ impl Home {
     }
 
     /// The comparison is refused as a wrong use, with these words.
-    fn refuses(&self, words: &[&str]) {
+    fn refuses_with(&self, words: &[&str]) {
         let output = self.rooms(&[]);
         let told = text(&output.stderr);
         assert_eq!(code(&output), 2, "{told}");
@@ -274,9 +274,9 @@ fn a_room_of_single_frames_has_no_say() {
 fn mistakes_are_told_with_file_and_line() {
     let home = Home::new();
     home.config("near", "", "\"manager.config.confirm_hit\" = [1]");
-    home.refuses(&["near.toml:9:1", "did you mean `manager.config.confirm_hits`?"]);
+    home.refuses_with(&["near.toml:9:1", "did you mean `manager.config.confirm_hits`?"]);
     home.config("near", "", "manager.config.confirm_hits = [1, 99]");
-    home.refuses(&[
+    home.refuses_with(&[
         "configs/near.toml:9:35",
         "= 99 is not allowed",
         "`confirm_hits` must lie between",
@@ -286,19 +286,19 @@ fn mistakes_are_told_with_file_and_line() {
     let checked = checked.output().unwrap();
     assert!(code(&checked) == 2 && text(&checked.stderr).contains("= 99 is not allowed"));
     home.config("near", "", "");
-    home.refuses(&["no config in the folder configs", "--configs"]);
+    home.refuses_with(&["no config in the folder configs", "--configs"]);
     home.config("near", TUNE, VALUES);
     let rooms = fs::read_to_string(home.path("rooms.toml")).unwrap();
     home.write("rooms.toml", &rooms.replace("b.mcap", "c.mcap"));
-    home.refuses(&["rooms.toml:5:9", "c.mcap"]);
+    home.refuses_with(&["rooms.toml:5:9", "c.mcap"]);
     Drawn::of(3).write(&home.path("logs/c.mcap"));
-    home.refuses(&["rooms.toml:5:9", "has no truth"]);
+    home.refuses_with(&["rooms.toml:5:9", "has no truth"]);
     home.write("rooms.toml", &format!("{rooms}[rooms.B.models]\nown = 'none.toml'\n"));
-    home.refuses(&["rooms.toml:7:7", "there is no model none.toml"]);
+    home.refuses_with(&["rooms.toml:7:7", "there is no model none.toml"]);
     home.write("rooms.toml", "[rooms.A]\nlogs = [\"logs/a.mcap\"]\n");
-    home.refuses(&["rooms.toml:1:", "two are needed"]);
+    home.refuses_with(&["rooms.toml:1:", "two are needed"]);
     fs::remove_file(home.path("rooms.toml")).unwrap();
-    home.refuses(&["rooms.toml"]);
+    home.refuses_with(&["rooms.toml"]);
 }
 
 #[cfg(unix)]
