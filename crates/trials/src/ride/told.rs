@@ -30,7 +30,7 @@ impl Contender {
         let mut detector = Table::new();
         detector.insert("plugin".to_owned(), plugin.into());
         detector.insert("roles".to_owned(), vec!["discover"].into());
-        let settings = self.table_of(&offer.known_positions)?;
+        let settings = self.table_of(offer.known_positions)?;
         detector.insert("config".to_owned(), settings.into());
         config.insert("detectors".to_owned(), vec![detector].into());
         // Cameras that a detector suits are no matter of the positions that are told.
