@@ -36,14 +36,18 @@ pub fn register(registry: &mut Registry) {
 /// message is a sentence about the file.
 pub fn onnxruntime(bytes: Vec<u8>, limits: &Limits) -> Result<Box<dyn Network>, String> {
     check_file(&bytes, limits)?;
-    let refused = |why: String| format!("onnxruntime refuses it: {why}");
-    let builder = Session::builder(environment()?).map_err(|why| refused(why.to_string()))?;
+    let builder = Session::builder(environment()?).map_err(refusal_for)?;
     let builder = builder.with_intra_threads(limits.threads.max(1));
-    let mut builder = builder.map_err(|why| refused(why.to_string()))?;
-    let session = builder.commit_from_memory(&bytes).map_err(|why| refused(why.to_string()))?;
+    let mut builder = builder.map_err(refusal_for)?;
+    let session = builder.commit_from_memory(&bytes).map_err(refusal_for)?;
     let [inputs, outputs] = [session.inputs(), session.outputs()].map(ports);
     let kinds = session.inputs().iter().map(element_type).collect();
     Ok(Box::new(OrtNetwork { session, inputs, outputs, kinds }))
+}
+
+/// The message on a network that the runtime does not take.
+fn refusal_for(why: impl std::fmt::Display) -> String {
+    format!("onnxruntime refuses it: {why}")
 }
 
 /// Loads the library on the first call.
@@ -56,12 +60,12 @@ fn load() -> Result<Environment, String> {
     let path = env::var_os(LIBRARY).filter(|path| !path.is_empty()).ok_or_else(|| {
         format!("needs onnxruntime: set {LIBRARY} to the path of its library (libonnxruntime.so)")
     })?;
-    let failed = |why: String| {
+    let builder = ort::init_from(&path).map_err(|why| why.to_string());
+    let built = builder.and_then(|builder| builder.build().map_err(|why| why.to_string()));
+    built.map_err(|why| {
         let shown = Path::new(&path).display();
         format!("needs onnxruntime, which {shown} ({LIBRARY}) is not: {why}")
-    };
-    let builder = ort::init_from(&path).map_err(|why| failed(why.to_string()))?;
-    builder.build().map_err(|why| failed(why.to_string()))
+    })
 }
 
 /// Network that onnxruntime runs.
@@ -80,7 +84,7 @@ fn element_type(outlet: &Outlet) -> Option<TensorElementType> {
 }
 
 fn ports(outlets: &[Outlet]) -> Vec<Port> {
-    let port = |outlet: &Outlet| {
+    let ports = outlets.iter().map(|outlet| {
         let element = match element_type(outlet) {
             Some(TensorElementType::Float32) => Element::Float,
             Some(TensorElementType::Int32 | TensorElementType::Int64) => Element::Integer,
@@ -95,25 +99,25 @@ fn ports(outlets: &[Outlet]) -> Vec<Port> {
             _ => Vec::new(),
         };
         Port { name: outlet.name().to_owned(), shape, element }
-    };
-    outlets.iter().map(port).collect()
+    });
+    ports.collect()
 }
 
 /// Converts a tensor to the element type of an input.
 fn to_value(kind: Option<TensorElementType>, tensor: &Tensor) -> Result<DynValue, String> {
     let shape = tensor.shape().to_vec();
-    let rounded = || tensor.values().iter().map(|value| value.round());
+    let rounded = tensor.values().iter().map(|value| value.round());
     let made = match kind {
         Some(TensorElementType::Int64) => {
-            let values: Vec<i64> = rounded().map(|value| value as i64).collect();
+            let values: Vec<i64> = rounded.map(|value| value as i64).collect();
             ort::value::Tensor::from_array((shape, values)).map(|value| value.into_dyn())
         }
         Some(TensorElementType::Int32) => {
-            let values: Vec<i32> = rounded().map(|value| value as i32).collect();
+            let values: Vec<i32> = rounded.map(|value| value as i32).collect();
             ort::value::Tensor::from_array((shape, values)).map(|value| value.into_dyn())
         }
         Some(TensorElementType::Uint8) => {
-            let values: Vec<u8> = rounded().map(|value| value as u8).collect();
+            let values: Vec<u8> = rounded.map(|value| value as u8).collect();
             ort::value::Tensor::from_array((shape, values)).map(|value| value.into_dyn())
         }
         _ => {
@@ -126,20 +130,28 @@ fn to_value(kind: Option<TensorElementType>, tensor: &Tensor) -> Result<DynValue
 
 /// Converts an output; `None` if it is no tensor of numbers.
 fn to_tensor(value: &DynValue) -> Option<Tensor> {
-    let sizes = |shape: &ort::value::Shape| -> Option<Vec<usize>> {
-        shape.iter().map(|size| usize::try_from(*size).ok()).collect()
-    };
     if let Ok((shape, values)) = value.try_extract_tensor::<f32>() {
-        return Tensor::new(sizes(shape)?, values.to_vec());
+        return Tensor::new(known_sizes(shape)?, values.to_vec());
     }
     if let Ok((shape, values)) = value.try_extract_tensor::<i64>() {
-        return Tensor::new(sizes(shape)?, values.iter().map(|value| *value as f32).collect());
+        return Tensor::new(
+            known_sizes(shape)?,
+            values.iter().map(|value| *value as f32).collect(),
+        );
     }
     if let Ok((shape, values)) = value.try_extract_tensor::<i32>() {
-        return Tensor::new(sizes(shape)?, values.iter().map(|value| *value as f32).collect());
+        return Tensor::new(
+            known_sizes(shape)?,
+            values.iter().map(|value| *value as f32).collect(),
+        );
     }
     let (shape, values) = value.try_extract_tensor::<u8>().ok()?;
-    Tensor::new(sizes(shape)?, values.iter().map(|value| f32::from(*value)).collect())
+    Tensor::new(known_sizes(shape)?, values.iter().map(|value| f32::from(*value)).collect())
+}
+
+/// The sizes of a shape, where all are known.
+fn known_sizes(shape: &ort::value::Shape) -> Option<Vec<usize>> {
+    shape.iter().map(|size| usize::try_from(*size).ok()).collect()
 }
 
 impl Network for OrtNetwork {
@@ -160,10 +172,10 @@ impl Network for OrtNetwork {
             values.push((&port.name, to_value(*kind, tensor)?.into()));
         }
         let outputs = self.session.run(values).map_err(|why| format!("it cannot be run: {why}"))?;
-        let output = |port: &Port| {
+        let tensors = self.outputs.iter().map(|port| {
             let tensor = outputs.get(port.name.as_str()).and_then(to_tensor);
             tensor.ok_or_else(|| format!("the output {port} is no tensor of numbers"))
-        };
-        self.outputs.iter().map(output).collect()
+        });
+        tensors.collect()
     }
 }

@@ -79,17 +79,21 @@ pub fn depth(array: &Bound<'_, PyAny>) -> PyResult<DepthImage> {
         return Err(wrong(format!("depth has shape {shape:?}; give rows x columns")));
     }
     let (height, width) = sides(&shape, "depth")?;
-    let metres = |value: f32| if value.is_finite() && value > 0.0 { value } else { f32::NAN };
     let packed: Vec<f32> = if let Ok(pixels) = array.extract::<PyReadonlyArray2<'_, f32>>() {
-        pixels.as_array().iter().map(|value| metres(*value)).collect()
+        pixels.as_array().iter().map(|value| of_metres(*value)).collect()
     } else if let Ok(pixels) = array.extract::<PyReadonlyArray2<'_, u16>>() {
         pixels.as_array().iter().map(|value| of_millimetres(*value)).collect()
     } else if let Ok(pixels) = array.extract::<PyReadonlyArray2<'_, f64>>() {
-        pixels.as_array().iter().map(|value| metres(*value as f32)).collect()
+        pixels.as_array().iter().map(|value| of_metres(*value as f32)).collect()
     } else {
         return Err(odd(array, "depth", "float32 (metres) or uint16 (millimetres)"));
     };
     DepthImage::from_pixels(width, height, packed).ok_or_else(|| wrong("depth has a wrong size"))
+}
+
+/// A depth in metres; none that is not above zero.
+fn of_metres(value: f32) -> f32 {
+    if value.is_finite() && value > 0.0 { value } else { f32::NAN }
 }
 
 fn of_millimetres(value: u16) -> f32 {

@@ -42,12 +42,11 @@ impl PyCamera {
         robot_from_camera: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let distortion = distorted(model, &distortion.unwrap_or_default())?;
-        let middle = |pixels: usize| 0.5 * (pixels as f64 - 1.0);
         let lens = Pinhole {
             fx,
             fy: fy.unwrap_or(fx),
-            cx: cx.unwrap_or_else(|| middle(width)),
-            cy: cy.unwrap_or_else(|| middle(height)),
+            cx: cx.unwrap_or(0.5 * (width as f64 - 1.0)),
+            cy: cy.unwrap_or(0.5 * (height as f64 - 1.0)),
             distortion,
         };
         check(width, height, &lens)?;
@@ -146,21 +145,20 @@ fn distorted(model: &str, given: &[f64]) -> PyResult<Distortion> {
     if given.iter().all(|value| *value == 0.0) {
         return Ok(Distortion::None);
     }
-    let most = |count: usize| {
-        if given.len() <= count {
-            Ok(())
-        } else {
-            Err(wrong(format!("{model} has at most {count} coefficients, not {}", given.len())))
+    let (distortion, most) = match model {
+        "plumb_bob" => (Distortion::PlumbBob(padded(given)), 5),
+        "rational_polynomial" => (Distortion::Rational(padded(given)), 14),
+        "equidistant" => (Distortion::Equidistant(padded(given)), 4),
+        _ => {
+            return Err(wrong(format!(
+                "no distortion model `{model}`; there are plumb_bob, rational_polynomial, equidistant"
+            )));
         }
     };
-    match model {
-        "plumb_bob" => most(5).map(|()| Distortion::PlumbBob(padded(given))),
-        "rational_polynomial" => most(14).map(|()| Distortion::Rational(padded(given))),
-        "equidistant" => most(4).map(|()| Distortion::Equidistant(padded(given))),
-        _ => Err(wrong(format!(
-            "no distortion model `{model}`; there are plumb_bob, rational_polynomial, equidistant"
-        ))),
+    if given.len() > most {
+        return Err(wrong(format!("{model} has at most {most} coefficients, not {}", given.len())));
     }
+    Ok(distortion)
 }
 
 fn padded<const N: usize>(given: &[f64]) -> [f64; N] {

@@ -11,11 +11,10 @@ use tagalong_view::Live;
 
 use crate::diagnostics::{Diagnostics, Status};
 use crate::inbox::{Arrival, Inbox};
-use crate::messages::SpeedLimit;
 use crate::nav2::{Follower, ends_goal};
 use crate::network::{Ear, Network};
 use crate::options::Setup;
-use crate::publishers::{Gate, Origin};
+use crate::publishers::Gate;
 use crate::services;
 use crate::skill::{Desk, Request, Verb};
 use crate::stamps::{StampClock, system_time};
@@ -178,30 +177,29 @@ impl Bridge {
         let inbox = &self.inbox;
         let switch = wheels.switch();
         let gate = Arc::clone(&self.gates.enable);
-        let on = move |origin: Option<Origin>| take_enable(&switch, &gate, origin);
-        let enable = self.network.listen_to_enable(enable, inbox, on)?;
+        let enable = self.network.listen_to_enable(enable, inbox, move |origin| {
+            take_enable(&switch, &gate, origin);
+        })?;
         let switch = wheels.switch();
         let gate = Arc::clone(&self.gates.reset);
         let topic = reset.clone();
         let theirs = Arc::clone(inbox);
         // The thread that owns the pipeline clears its fault as well. The time is that of the
         // publication, so that a stop that comes in between is not cleared.
-        let on = move |origin: Origin| {
+        let reset = self.network.listen_to_reset(reset, inbox, move |origin| {
             let Ok(age) = gate.admit(origin, Instant::now(), system_time()) else { return };
             let published = switch.now().saturating_sub(age);
             let nanos = u64::try_from(published.as_nanos()).unwrap_or(u64::MAX);
             theirs.push(&topic, nanos.to_le_bytes().to_vec(), 1);
-        };
-        let reset = self.network.listen_to_reset(reset, inbox, on)?;
+        })?;
         let topic = &self.options.speed_limit;
         let theirs = Arc::clone(inbox);
         let key = topic.clone();
         let max_speed_mps = self.max_speed_mps;
         // Only the newest limit holds.
-        let on = move |limit: SpeedLimit| {
+        let limit = self.network.listen_to_speed_limit(topic, inbox, move |limit| {
             theirs.push(&key, limit.mps(max_speed_mps).to_le_bytes().to_vec(), 1);
-        };
-        let limit = self.network.listen_to_speed_limit(topic, inbox, on)?;
+        })?;
         Ok(vec![enable, reset, limit])
     }
 

@@ -126,21 +126,21 @@ impl Status {
     /// Returns the message for a time: its level is that of the worst of its causes.
     fn message(&self, now: Instant) -> DiagnosticStatus {
         let (level, message) = self.worst(now);
-        let value = |key: &str, value: String| KeyValue { key: key.into(), value };
+        let values = [
+            ("frames", self.frames.to_string()),
+            ("enable", self.permission.map_or("no controller", Permission::cause).into()),
+            ("driver", self.driver_name().into()),
+            ("other publishers of commands", self.rivals.to_string()),
+            ("publishers of the enable", self.enable_publishers.to_string()),
+            ("enables and resets too old or ahead", self.untimely.to_string()),
+            ("malformed messages", self.malformed.to_string()),
+        ];
         DiagnosticStatus {
             level,
             name: "tagalong: follow".into(),
             message,
             hardware_id: "tagalong".into(),
-            values: vec![
-                value("frames", self.frames.to_string()),
-                value("enable", self.permission.map_or("no controller", Permission::cause).into()),
-                value("driver", self.driver_name().into()),
-                value("other publishers of commands", self.rivals.to_string()),
-                value("publishers of the enable", self.enable_publishers.to_string()),
-                value("enables and resets too old or ahead", self.untimely.to_string()),
-                value("malformed messages", self.malformed.to_string()),
-            ],
+            values: values.map(|(key, value)| KeyValue { key: key.into(), value }).to_vec(),
         }
     }
 
@@ -207,27 +207,28 @@ mod tests {
             is_resting: false,
             driver: None,
         };
-        let worst = |status: Status| status.worst(now + Duration::from_secs(1));
-        assert_eq!(worst(well), (OK, "enabled".into()));
-        assert_eq!(worst(Status { malformed: 1, ..well }).0, WARN);
-        assert_eq!(worst(Status { rivals: 1, ..well }).0, WARN);
+        let later = now + Duration::from_secs(1);
+        assert_eq!(Status { malformed: 1, ..well }.worst(later).0, WARN);
+        assert_eq!(Status { rivals: 1, ..well }.worst(later).0, WARN);
         let latched = Some(Permission::Latched("switched off"));
-        assert_eq!(worst(Status { permission: latched, ..well }), (WARN, "switched off".into()));
-        let contested = worst(Status { enable_publishers: 2, ..well });
-        assert_eq!(contested, (ERROR, "2 publishers of the enable: end all but one".into()));
         let late = well.worst(now + Duration::from_millis(1001));
         assert_eq!(late.0, STALE);
         let fault = Status { fault: Some("odometry jumped"), permission: latched, ..well };
-        assert_eq!(worst(fault), (ERROR, "fault: odometry jumped".into()));
         let missing = Status { driver: Some(DriverState::Missing), ..well };
-        assert_eq!(worst(missing), (WARN, "no following server of Nav2".into()));
         let unconfirmed = Status { driver: Some(DriverState::Unconfirmed), ..fault };
-        assert_eq!(worst(unconfirmed), (ERROR, "Nav2 does not confirm that it stops".into()));
-        assert_eq!(
-            worst(Status { is_resting: true, ..fault }).0,
-            OK,
-            "an inactive node is not ill"
-        );
+        let contested = Status { enable_publishers: 2, ..well };
+        for (status, level, message) in [
+            (well, OK, "enabled"),
+            (Status { permission: latched, ..well }, WARN, "switched off"),
+            (contested, ERROR, "2 publishers of the enable: end all but one"),
+            (fault, ERROR, "fault: odometry jumped"),
+            (missing, WARN, "no following server of Nav2"),
+            (unconfirmed, ERROR, "Nav2 does not confirm that it stops"),
+        ] {
+            assert_eq!(status.worst(later), (level, message.into()));
+        }
+        let resting = Status { is_resting: true, ..fault };
+        assert_eq!(resting.worst(later).0, OK, "an inactive node is not ill");
         let stuck = Status { frame_since: Some(now), ..well };
         assert_eq!(stuck.worst(now + Duration::from_millis(501)).0, ERROR);
         assert_eq!(

@@ -36,24 +36,27 @@ impl HttpServer {
     /// # Errors
     /// [`BridgeError::Config`] for an address that is not on loopback, or that is taken.
     pub(crate) fn start(address: SocketAddr, desk: Desk) -> Result<Self, BridgeError> {
-        let failed = |why: String| BridgeError::Config(format!("--http {address}: {why}"));
         // Any program that reaches the port chooses the person that the robot drives after.
         if !address.ip().is_loopback() {
             let why = "must be an address of this computer, as 127.0.0.1:8080; put a proxy with \
                        authentication before it for others";
-            return Err(failed(why.to_owned()));
+            return Err(BridgeError::Config(format!("--http {address}: {why}")));
         }
         let mut access = Access::at(address).with_changes(Changes::FromPrograms);
         (access.key, access.body_bytes) = (false, BODY_BYTES);
-        let server = Server::open(access).map_err(|error| failed(error.to_string()))?;
-        let address = server.address();
+        let server = Server::open(access)
+            .map_err(|error| BridgeError::Config(format!("--http {address}: {error}")))?;
+        let bound = server.address();
         let stop = Arc::new(AtomicBool::new(false));
         let theirs = Arc::clone(&stop);
-        let serve = move || server.serve(&Arc::new(Skill(desk)), || theirs.load(Ordering::Relaxed));
-        let thread = thread::Builder::new().name("http".into()).spawn(serve);
-        let thread =
-            thread.map_err(|error| failed(format!("no thread for it can be started: {error}")))?;
-        Ok(Self { address, stop, thread: Some(thread) })
+        let thread = thread::Builder::new()
+            .name("http".into())
+            .spawn(move || server.serve(&Arc::new(Skill(desk)), || theirs.load(Ordering::Relaxed)));
+        let thread = thread.map_err(|error| {
+            let why = format!("no thread for it can be started: {error}");
+            BridgeError::Config(format!("--http {address}: {why}"))
+        })?;
+        Ok(Self { address: bound, stop, thread: Some(thread) })
     }
 
     /// Returns the address of the server, with a slash at its end.

@@ -80,10 +80,9 @@ impl Inbox {
     /// Returns all waiting messages by topic, in the order of arrival within a topic; empty if none
     /// arrives within `patience`.
     pub fn take(&self, patience: Duration) -> Vec<Arrival> {
-        let empty = |topics: &mut BTreeMap<String, Topic>| {
+        let waited = self.arrived.wait_timeout_while(self.lock(), patience, |topics| {
             topics.values().all(|topic| topic.waiting.is_empty())
-        };
-        let waited = self.arrived.wait_timeout_while(self.lock(), patience, empty);
+        });
         let (mut topics, _) = waited.unwrap_or_else(PoisonError::into_inner);
         let all = topics.iter_mut().flat_map(|(name, topic)| {
             topic.waiting.drain(..).map(|(arrival_ns, message)| Arrival {

@@ -32,7 +32,6 @@ pub(crate) fn listen(
     let mut listening = Listening::new(&name, &setup.input, &setup.limits, inputs)?;
     let mut ears: Vec<Ear> = Vec::new();
     let further = setup.pipeline.obstacle_sources();
-    let is_source = |topic: &str| further.iter().any(|source| source.topic == topic);
     let deadline = Instant::now() + Duration::from_secs_f64(options.wait);
     let mut attempt = Instant::now() + ATTEMPT;
     let mut first: Option<Instant> = None;
@@ -40,8 +39,9 @@ pub(crate) fn listen(
     while !is_over() {
         for (topic, kind) in network.topics() {
             if listening.announce(&topic, &kind) && listening.wants(&topic) {
+                let is_source = further.iter().any(|source| source.topic == topic);
                 let ear = match network.listen(&topic, &kind, inbox, clock)? {
-                    None if is_source(&topic) => Some(network.listen_raw(&topic, &kind, inbox)?),
+                    None if is_source => Some(network.listen_raw(&topic, &kind, inbox)?),
                     ear => ear,
                 };
                 ears.extend(ear);

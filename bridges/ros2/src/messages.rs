@@ -312,11 +312,15 @@ mod tests {
 
     #[test]
     fn a_speed_limit_is_a_speed_a_part_or_none() {
-        let limit = |percentage, speed_limit| {
-            SpeedLimit { header: Header::default(), percentage, speed_limit }.mps(0.8)
-        };
-        assert_eq!((limit(false, 0.3), limit(true, 50.0)), (0.3, 0.4));
-        assert_eq!((limit(false, 0.0), limit(true, 0.0)), (f64::INFINITY, f64::INFINITY));
+        for (percentage, speed_limit, mps) in [
+            (false, 0.3, 0.3),
+            (true, 50.0, 0.4),
+            (false, 0.0, f64::INFINITY),
+            (true, 0.0, f64::INFINITY),
+        ] {
+            let limit = SpeedLimit { header: Header::default(), percentage, speed_limit };
+            assert_eq!(limit.mps(0.8), mps, "{percentage} {speed_limit}");
+        }
     }
 
     #[test]

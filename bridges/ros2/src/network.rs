@@ -214,14 +214,13 @@ impl Network {
     ) -> Result<Ear, BridgeError> {
         let inbox = Arc::clone(inbox);
         let name = topic.to_owned();
-        let take = move |message: Option<(Bool, MessageInfo)>| {
+        self.hear(topic, "std_msgs/msg/Bool", commands(), move |message: Option<(Bool, _)>| {
             if message.is_none() {
                 inbox.count_malformed(&name);
             }
             let enable = message.filter(|(message, _)| message.data);
             on(enable.map(|(_, info)| Origin::from(&info)));
-        };
-        self.hear(topic, "std_msgs/msg/Bool", commands(), take)
+        })
     }
 
     /// Calls `on` for each message of the topic that resets.
@@ -233,11 +232,10 @@ impl Network {
     ) -> Result<Ear, BridgeError> {
         let inbox = Arc::clone(inbox);
         let name = topic.to_owned();
-        let take = move |message: Option<(Empty, MessageInfo)>| match message {
-            Some((_, info)) => on(Origin::from(&info)),
+        self.hear(topic, "std_msgs/msg/Empty", commands(), move |message| match message {
+            Some((Empty { .. }, info)) => on(Origin::from(&info)),
             None => inbox.count_malformed(&name),
-        };
-        self.hear(topic, "std_msgs/msg/Empty", commands(), take)
+        })
     }
 
     /// Calls `on` for each message of the topic of speed limits. A message that cannot be read changes
@@ -250,11 +248,13 @@ impl Network {
     ) -> Result<Ear, BridgeError> {
         let inbox = Arc::clone(inbox);
         let name = topic.to_owned();
-        let take = move |message: Option<(SpeedLimit, MessageInfo)>| match message {
-            Some((limit, _)) if limit.speed_limit >= 0.0 => on(limit),
-            _ => inbox.count_malformed(&name),
-        };
-        self.hear(topic, "nav2_msgs/msg/SpeedLimit", commands(), take)
+        let message_type = "nav2_msgs/msg/SpeedLimit";
+        self.hear(topic, message_type, commands(), move |message: Option<(SpeedLimit, _)>| {
+            match message {
+                Some((limit, _)) if limit.speed_limit >= 0.0 => on(limit),
+                _ => inbox.count_malformed(&name),
+            }
+        })
     }
 
     /// Returns the numbers of other participants' publishers on some topics.
@@ -327,11 +327,10 @@ impl Network {
         clock: &Arc<StampClock>,
     ) -> Result<Ear, BridgeError> {
         let clock = Arc::clone(clock);
-        let encode = move |message: M| {
+        self.ear(topic, message_type, sensor(depth), inbox, move |message: M| {
             clock.record_arrival(message.stamp());
             (message.encode(), message.room())
-        };
-        self.ear(topic, message_type, sensor(depth), inbox, encode)
+        })
     }
 
     fn plain<M: Message + Serialize + DeserializeOwned + Send + 'static>(
@@ -356,7 +355,7 @@ impl Network {
         let inbox = Arc::clone(inbox);
         let name = topic.to_owned();
         let ours = participant_of(Gid::from(self.context.domain_participant().guid()));
-        let put = move |message: Option<(M, MessageInfo)>| match message {
+        self.hear(topic, message_type, qos, move |message| match message {
             // The transforms that this node publishes itself are no input.
             Some((_, info)) if participant_of(info.publisher_gid()) == ours => {}
             Some((message, _)) => {
@@ -364,8 +363,7 @@ impl Network {
                 inbox.push(&name, bytes, room);
             }
             None => inbox.count_malformed(&name),
-        };
-        self.hear(topic, message_type, qos, put)
+        })
     }
 
     /// Calls `take` for each message of a topic in a thread of its own, with `None` for one that does
@@ -546,16 +544,16 @@ mod tests {
         let own: Publisher<TFMessage> = bridge.publisher("/tf").unwrap();
         let _ear = bridge.plain::<TFMessage>("/tf", sensor(OTHERS), &inbox).unwrap();
         let theirs: Publisher<TFMessage> = other.publisher("/tf").unwrap();
-        let named = |child: &str| {
+        let [person, base_link] = ["person_1", "base_link"].map(|child| {
             let child_frame_id = child.to_owned();
             TFMessage {
                 transforms: vec![TransformStamped { child_frame_id, ..Default::default() }],
             }
-        };
+        });
         let mut heard = Vec::new();
         for _ in 0..100 {
-            let _full = own.publish(named("person_1"));
-            let _full = theirs.publish(named("base_link"));
+            let _full = own.publish(person.clone());
+            let _full = theirs.publish(base_link.clone());
             heard.extend(inbox.take(std::time::Duration::from_millis(100)));
             if heard.len() > 5 {
                 break;

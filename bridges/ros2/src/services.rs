@@ -146,27 +146,28 @@ fn enrollment(parameters: &[Parameter]) -> Result<Enrollment, String> {
     let mut person = None;
     let mut patience = Enrollment::of(Choice::Nearest);
     for Parameter { name, value } in parameters {
-        let wrong = |wanted: &str| format!("`{name}` must be {wanted}");
+        let wrong = format!("`{name}` must be");
         let choice = match name.as_str() {
-            "person" => Some(named(value).ok_or_else(|| wrong("\"nearest\" or \"approach\""))?),
+            "person" => Some(named(value).ok_or(format!("{wrong} \"nearest\" or \"approach\""))?),
             "track" => {
                 let number = number(value).and_then(whole);
-                Some(Choice::Track(TrackId(number.ok_or_else(|| wrong("the number of a track"))?)))
+                let number = number.ok_or(format!("{wrong} the number of a track"))?;
+                Some(Choice::Track(TrackId(number)))
             }
-            "point" => Some(Choice::Point(point(value).ok_or_else(|| wrong("two numbers"))?)),
+            "point" => Some(Choice::Point(point(value).ok_or(format!("{wrong} two numbers"))?)),
             "lose_after_s" => {
-                patience.lose_after_s = Some(number(value).ok_or_else(|| wrong("a number"))?);
+                patience.lose_after_s = Some(number(value).ok_or(format!("{wrong} a number"))?);
                 None
             }
             "give_up_s" => {
-                patience.give_up_s = Some(number(value).ok_or_else(|| wrong("a number"))?);
+                patience.give_up_s = Some(number(value).ok_or(format!("{wrong} a number"))?);
                 None
             }
             "search" if value.ptype == ParameterType::BOOL => {
                 patience.search = Some(value.boolean_value);
                 None
             }
-            "search" => return Err(wrong("true or false")),
+            "search" => return Err(format!("{wrong} true or false")),
             _ => {
                 let known = "person, track, point, lose_after_s, search, give_up_s";
                 return Err(format!("unknown `{name}`; there are {known}"));
@@ -244,11 +245,11 @@ mod tests {
         let search = parameter("search", 1, |value| value.boolean_value = true);
         let patience = parameter("lose_after_s", 3, |value| value.double_value = 3.5);
         let give_up = parameter("give_up_s", 2, |value| value.int_value = 30);
-        let of = |parameters: &[Parameter]| enrollment(parameters).unwrap();
-        assert_eq!(of(std::slice::from_ref(&nearest)), Enrollment::of(Choice::Nearest));
-        assert_eq!(of(&[point]).person, Choice::Point([320.0, 240.5]));
-        assert_eq!(of(&[pixels]).person, Choice::Point([320.0, 240.0]));
-        let all = of(&[search, patience, track.clone(), give_up.clone()]);
+        let by_default = enrollment(std::slice::from_ref(&nearest));
+        assert_eq!(by_default.unwrap(), Enrollment::of(Choice::Nearest));
+        assert_eq!(enrollment(&[point]).unwrap().person, Choice::Point([320.0, 240.5]));
+        assert_eq!(enrollment(&[pixels]).unwrap().person, Choice::Point([320.0, 240.0]));
+        let all = enrollment(&[search, patience, track.clone(), give_up.clone()]).unwrap();
         assert_eq!(all.person, Choice::Track(TrackId(3)));
         assert_eq!((all.search, all.lose_after_s), (Some(true), Some(3.5)));
         assert_eq!(all.give_up_s, Some(30.0));

@@ -57,23 +57,23 @@ mod tests {
 
     #[test]
     fn counts_of_two_lives_add_up_and_those_of_topics_go_on() {
-        let traffic = |received| {
+        let [few, many] = [10, 25].map(|received| {
             BTreeMap::from([("/odom".to_owned(), Traffic { received, ..Traffic::default() })])
-        };
+        });
         let mut all = Summary {
             frames: 3,
-            traffic: traffic(10),
+            traffic: few,
             counters: BTreeMap::from([("unpaired", 1)]),
             told: CommandCounts { commands: 5, zeros: 5 },
         };
         all.add(Summary {
             frames: 4,
-            traffic: traffic(25),
+            traffic: many.clone(),
             counters: BTreeMap::from([("unpaired", 2), ("late", 1)]),
             told: CommandCounts { commands: 7, zeros: 6 },
         });
         let told = CommandCounts { commands: 12, zeros: 11 };
         let counters = BTreeMap::from([("unpaired", 3), ("late", 1)]);
-        assert_eq!(all, Summary { frames: 7, traffic: traffic(25), counters, told });
+        assert_eq!(all, Summary { frames: 7, traffic: many, counters, told });
     }
 }

@@ -252,8 +252,9 @@ impl Shared {
 
     /// Waits for new orders, but no longer than a period; returns `None` at the end.
     fn wait(&self, period: Duration) -> Option<State> {
-        let idle = |state: &mut State| !state.is_new && !state.quits;
-        let waited = self.changed.wait_timeout_while(self.lock(), period, idle);
+        let waited = self
+            .changed
+            .wait_timeout_while(self.lock(), period, |state| !state.is_new && !state.quits);
         let (mut state, _) = waited.unwrap_or_else(PoisonError::into_inner);
         state.is_new = false;
         let since = self.started.elapsed();
@@ -279,9 +280,12 @@ mod tests {
 
     fn start_with(tape: &Tape, timeout: Duration) -> Wheels {
         let tape = Arc::clone(tape);
-        let tell = move |wheels| tape.lock().unwrap().push((Instant::now(), wheels));
         let switch = EnableSwitch::new(timeout);
-        Wheels::start(Duration::from_millis(5), switch, Stamp::default, tell).unwrap()
+        let wheels =
+            Wheels::start(Duration::from_millis(5), switch, Stamp::default, move |wheels| {
+                tape.lock().unwrap().push((Instant::now(), wheels));
+            });
+        wheels.unwrap()
     }
 
     /// Waits until so many commands were sent since a time: threads of a busy machine are late.

@@ -149,33 +149,42 @@ impl Document {
 
     /// Returns the numbers of the people that a change may touch, after checking it.
     fn touched(&self, change: &Change) -> Result<Vec<i64>, String> {
-        let there = |id: &i64, frame: &u32| match self.people.get(id).map(|p| p.at(*frame)) {
-            Some(Some(_)) => Ok(vec![*id]),
-            _ => Err(format!("person {id} is not in frame {frame}")),
-        };
-        let known = |id: &i64| {
-            if self.people.contains_key(id) {
-                Ok(vec![*id])
-            } else {
-                Err(format!("there is no person {id}"))
-            }
-        };
         match change {
             Change::Box { id, region, .. } => {
                 check_region(region)?;
                 Ok(vec![check_id(id.unwrap_or_else(|| self.free_id()))?])
             }
             Change::Head { .. } => Err("the place of a head needs an image".into()),
-            Change::Number { id, to, .. } => Ok([known(id)?, vec![check_id(*to)?]].concat()),
-            Change::Delete { id, .. } | Change::Fill { id, .. } => known(id),
-            Change::Pin { id, frame } | Change::Unpin { id, frame } => there(id, frame),
+            Change::Number { id, to, .. } => {
+                Ok([self.known_person(*id)?, vec![check_id(*to)?]].concat())
+            }
+            Change::Delete { id, .. } | Change::Fill { id, .. } => self.known_person(*id),
+            Change::Pin { id, frame } | Change::Unpin { id, frame } => {
+                self.person_in_frame(*id, *frame)
+            }
             Change::Note { id, frame, visible, .. } => {
                 if visible.is_some_and(|visible| !(0.0..=1.0).contains(&visible)) {
                     return Err("the visible part is a fraction, 0 to 1".into());
                 }
-                there(id, frame)
+                self.person_in_frame(*id, *frame)
             }
             Change::Undo | Change::Redo => Ok(Vec::new()),
+        }
+    }
+
+    /// This person alone, where the document has it.
+    fn known_person(&self, id: i64) -> Result<Vec<i64>, String> {
+        if !self.people.contains_key(&id) {
+            return Err(format!("there is no person {id}"));
+        }
+        Ok(vec![id])
+    }
+
+    /// This person alone, where it is in the frame.
+    fn person_in_frame(&self, id: i64, frame: u32) -> Result<Vec<i64>, String> {
+        match self.people.get(&id).map(|person| person.at(frame)) {
+            Some(Some(_)) => Ok(vec![id]),
+            _ => Err(format!("person {id} is not in frame {frame}")),
         }
     }
 

@@ -197,16 +197,20 @@ impl Film {
 /// torso.
 fn place(camera: &Camera, depth: &DepthImage, region: &Region) -> Option<Place> {
     let square = Rect::new(region.x, region.y, region.width, region.height);
-    // A box says how far away its person is: another depth is that of an occluder, or of the wall.
-    let fits = |depth_m: &f64| {
-        let by_size = camera.focal_px() * UPPER_BODY_SIDE_M / square.width.max(square.height);
-        let ratio = depth_m / by_size;
-        camera.panorama().is_some() || (1.0 / SAME_DEPTH..=SAME_DEPTH).contains(&ratio)
+    let face = depth.face_m(&square).filter(|depth_m| fits_box(camera, &square, *depth_m));
+    let depth_m = match face {
+        Some(face_m) => face_m,
+        None => depth.surface_m(&square).filter(|depth_m| fits_box(camera, &square, *depth_m))?,
     };
-    let face = depth.face_m(&square).filter(fits);
-    let depth_m = face.or_else(|| depth.surface_m(&square).filter(fits))?;
     let head_in_camera_m = head_at(camera, &square, depth_m)?;
     Some(Place { head_in_camera_m, by_torso: face.is_none() })
+}
+
+/// A box says how far away its person is: another depth is that of an occluder, or of the wall.
+fn fits_box(camera: &Camera, square: &Rect, depth_m: f64) -> bool {
+    let by_size = camera.focal_px() * UPPER_BODY_SIDE_M / square.width.max(square.height);
+    let ratio = depth_m / by_size;
+    camera.panorama().is_some() || (1.0 / SAME_DEPTH..=SAME_DEPTH).contains(&ratio)
 }
 
 /// Returns the surface of the head of a person in a box at a depth, in the camera frame, m.

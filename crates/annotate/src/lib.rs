@@ -306,14 +306,18 @@ fn proposals(film: &Film, tracks: Boxes) -> BTreeMap<i64, Person> {
 }
 
 fn proposal(film: &Film, boxes: &[(u32, Region)]) -> Person {
-    let time_s = |number: u32| film.shot(number).map_or(0.0, |shot| shot.t_s);
     let mut keys = BTreeMap::new();
     let mut shown = BTreeSet::new();
-    for part in boxes.chunk_by(|a, b| time_s(b.0) - time_s(a.0) <= BRIDGED_S) {
+    for part in boxes.chunk_by(|a, b| time_of(film, b.0) - time_of(film, a.0) <= BRIDGED_S) {
         keys.extend(sparse(part));
         shown.extend(part[0].0..=part[part.len() - 1].0);
     }
     Person::of(keys, &shown)
+}
+
+/// The time of a frame, in seconds; 0 where the film does not have it.
+fn time_of(film: &Film, number: u32) -> f64 {
+    film.shot(number).map_or(0.0, |shot| shot.t_s)
 }
 
 #[cfg(test)]

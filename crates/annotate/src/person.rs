@@ -226,12 +226,11 @@ const JOINED_FRAMES: u32 = 30;
 
 /// Returns the region that is a share of the way from one to another.
 fn between(from: &Region, to: &Region, share: f64) -> Region {
-    let mix = |a: f64, b: f64| a + (b - a) * share;
     Region {
-        x: mix(from.x, to.x),
-        y: mix(from.y, to.y),
-        width: mix(from.width, to.width),
-        height: mix(from.height, to.height),
+        x: from.x + (to.x - from.x) * share,
+        y: from.y + (to.y - from.y) * share,
+        width: from.width + (to.width - from.width) * share,
+        height: from.height + (to.height - from.height) * share,
     }
 }
 

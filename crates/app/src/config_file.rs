@@ -282,20 +282,23 @@ mod tests {
 
     #[test]
     fn a_known_network_that_is_not_installed_is_answered_with_its_command() {
+        let why = refusal_of("movenet-multipose");
+        assert!(why.contains("`tagalong model --install movenet-multipose.onnx`"), "{why}");
+        let why = refusal_of("own");
+        assert!(!why.contains("--install"), "{why}");
+    }
+
+    /// The message of a config that names this network, which no file holds.
+    fn refusal_of(model: &str) -> String {
         let mut registry = Registry::default();
         tagalong_catalog::register(&mut registry);
-        let folder = tempfile::tempdir().unwrap();
-        let refusal = |model: &str| {
-            let text = format!(
-                "[[detectors]]\nplugin = 'onnx'\nconfig = {{ model = '{model}' }}\n\
-                 [filter]\nplugin = 'image-kalman'\n"
-            );
-            let config = ConfigFile::of_text(text, folder.path());
-            config.pipeline(&registry, None).err().unwrap().message
-        };
-        let why = refusal("movenet-multipose");
-        assert!(why.contains("`tagalong model --install movenet-multipose.onnx`"), "{why}");
-        assert!(!refusal("own").contains("--install"), "{}", refusal("own"));
+        let folder = tempfile::tempdir().expect("a folder");
+        let text = format!(
+            "[[detectors]]\nplugin = 'onnx'\nconfig = {{ model = '{model}' }}\n\
+             [filter]\nplugin = 'image-kalman'\n"
+        );
+        let config = ConfigFile::of_text(text, folder.path());
+        config.pipeline(&registry, None).err().expect("a refusal").message
     }
 
     #[test]

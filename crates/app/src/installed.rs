@@ -42,12 +42,11 @@ pub struct NetworkFiles {
 impl NetworkFiles {
     /// Returns the files of a network of this name.
     pub fn of(folder: &Path, name: &str) -> Self {
-        let file = |ending: &str| folder.join(format!("{name}.{ending}"));
         Self {
-            onnx: file("onnx"),
-            config: file("toml"),
+            onnx: folder.join(format!("{name}.onnx")),
+            config: folder.join(format!("{name}.toml")),
             depth_config: folder.join(format!("{name}{WITH_DEPTH}.toml")),
-            card: file("card.toml"),
+            card: folder.join(format!("{name}.card.toml")),
             default: folder.join(DEFAULT),
         }
     }
@@ -203,23 +202,22 @@ mod tests {
             fs::write(files.config, "").unwrap();
         }
         fs::write(folder.join("alone.onnx"), "").unwrap();
-        let config = |name: &str| config_in(folder, name);
-        assert_eq!(config("yolox"), Some(folder.join("yolox.toml")));
-        assert_eq!(config("alone"), None, "an embedding has no config");
+        assert_eq!(config_in(folder, "yolox"), Some(folder.join("yolox.toml")));
+        assert_eq!(config_in(folder, "alone"), None, "an embedding has no config");
         assert_eq!(
-            config("yolox-depth"),
+            config_in(folder, "yolox-depth"),
             None,
             "a network that was installed before there were any"
         );
         let with_depth = folder.join("yolox-depth.toml");
         fs::write(&with_depth, "").unwrap();
-        assert_eq!(config("yolox-depth"), Some(with_depth));
-        assert_eq!(config("other-depth"), None);
-        assert_eq!(config(NETWORK), Some(folder.join("movenet.toml")), "the first");
+        assert_eq!(config_in(folder, "yolox-depth"), Some(with_depth));
+        assert_eq!(config_in(folder, "other-depth"), None);
+        assert_eq!(config_in(folder, NETWORK), Some(folder.join("movenet.toml")), "the first");
         fs::write(folder.join(DEFAULT), "yolox\n").unwrap();
-        assert_eq!(config(NETWORK), Some(folder.join("yolox.toml")));
+        assert_eq!(config_in(folder, NETWORK), Some(folder.join("yolox.toml")));
         fs::write(folder.join(DEFAULT), "removed").unwrap();
-        assert_eq!(config(NETWORK), Some(folder.join("movenet.toml")));
+        assert_eq!(config_in(folder, NETWORK), Some(folder.join("movenet.toml")));
         assert_eq!(installed_in(folder), ["movenet", "yolox"]);
         assert_eq!(onnx_files(folder, false), ["alone"]);
     }

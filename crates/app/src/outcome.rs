@@ -132,8 +132,8 @@ pub fn make_folder(folder: &Path) -> Result<(), Failure> {
 /// As for [`make_folder`]; a file that cannot be written: exit code 1.
 pub fn write_file(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Failure> {
     make_room_for(path)?;
-    let failed = |source| WriteError::Io { path: path.to_owned(), source };
-    std::fs::write(path, content).map_err(|source| failed(source).into())
+    std::fs::write(path, content)
+        .map_err(|source| WriteError::Io { path: path.to_owned(), source }.into())
 }
 
 /// Makes the parent folder of a file.
@@ -208,19 +208,22 @@ mod tests {
 
     #[test]
     fn a_full_disk_is_the_same_failure_early_and_late() {
-        let error =
-            |kind| WriteError::Io { path: "out/tracks.mcap".into(), source: io::Error::from(kind) };
         let [early, late] =
-            [refused, Failure::from].map(|told| told(error(io::ErrorKind::StorageFull)));
+            [refused, Failure::from].map(|told| told(write_error(io::ErrorKind::StorageFull)));
         assert_eq!((early.code, &early), (1, &late));
         assert!(
             early.message.contains("the disk is full") && early.message.contains("out/tracks.mcap")
         );
         let printed = disk_full("cannot write out/tracks.mcap: no storage space");
         assert_eq!(early, printed, "a folder, a file and stdout have the same words");
-        let denied = refused(error(io::ErrorKind::PermissionDenied));
+        let denied = refused(write_error(io::ErrorKind::PermissionDenied));
         assert_eq!(denied.code, 2, "another folder helps");
-        assert_eq!(Failure::from(error(io::ErrorKind::BrokenPipe)).code, 1);
+        assert_eq!(Failure::from(write_error(io::ErrorKind::BrokenPipe)).code, 1);
+    }
+
+    /// The error of a file that cannot be written.
+    fn write_error(kind: io::ErrorKind) -> WriteError {
+        WriteError::Io { path: "out/tracks.mcap".into(), source: io::Error::from(kind) }
     }
 
     #[test]

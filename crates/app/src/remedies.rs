@@ -202,18 +202,21 @@ fn keys_of<'a>(
     plugin: &str,
     setting: &str,
 ) -> Vec<(String, Option<&'a Value>)> {
-    let mut keys = Vec::new();
-    let mut add = |path: String, section: &'a Value| {
-        let is_it = section.get("plugin").and_then(Value::as_str) == Some(plugin);
-        let now = section.get("config").and_then(|config| config.get(setting));
-        keys.extend(is_it.then(|| (format!("{path}.config.{setting}"), now)));
-    };
+    let mut sections: Vec<(String, &'a Value)> = Vec::new();
     for (name, value) in resolved {
         match value {
             Value::Array(items) => {
-                items.iter().enumerate().for_each(|(at, item)| add(format!("{name}.{at}"), item));
+                sections
+                    .extend(items.iter().enumerate().map(|(at, it)| (format!("{name}.{at}"), it)));
             }
-            value => add(name.clone(), value),
+            value => sections.push((name.clone(), value)),
+        }
+    }
+    let mut keys = Vec::new();
+    for (path, section) in sections {
+        if section.get("plugin").and_then(Value::as_str) == Some(plugin) {
+            let now = section.get("config").and_then(|config| config.get(setting));
+            keys.push((format!("{path}.config.{setting}"), now));
         }
     }
     keys
@@ -499,14 +502,18 @@ mod tests {
     fn changes_are_lines_of_a_config() {
         let resolved: Table =
             toml::from_str("[manager]\nplugin = 'm'\n[[detectors]]\nplugin = 'd'\n").unwrap();
-        let line = |key, value: Value| Change::of(&resolved, key, &value).line;
-        assert_eq!(line("manager.config.hits", 3.into()), "[manager.config] hits = 3");
-        assert_eq!(
-            line("detectors.0.config.cost", 0.2.into()),
-            "[[detectors]] plugin = \"d\", config = { cost = 0.2 }"
-        );
         let sprt = Value::Table(toml::from_str("plugin = 'manage-sprt'").unwrap());
-        assert_eq!(line("manager", sprt), "[manager] plugin = \"manage-sprt\"");
+        for (key, value, line) in [
+            ("manager.config.hits", 3.into(), "[manager.config] hits = 3"),
+            (
+                "detectors.0.config.cost",
+                0.2.into(),
+                "[[detectors]] plugin = \"d\", config = { cost = 0.2 }",
+            ),
+            ("manager", sprt, "[manager] plugin = \"manage-sprt\""),
+        ] {
+            assert_eq!(Change::of(&resolved, key, &value).line, line);
+        }
     }
 
     #[test]

@@ -237,11 +237,16 @@ mod tests {
     #[test]
     fn a_mistyped_name_of_an_installed_network_is_answered_with_it() {
         let installed = ["yolox-nano-depth", "yolox-nano", "depth-nekf"].map(str::to_owned);
-        let best = |wanted| nearest_installed(wanted, &installed, ["depth-ekf"].into_iter());
-        assert_eq!(best("yolox-nan"), Some("yolox-nano"));
-        assert_eq!(best("yolo-nano-depth"), Some("yolox-nano-depth"));
-        assert_eq!(best("depth-ekff"), None, "a config is nearer");
-        assert_eq!(best("zzz"), None);
+        for (wanted, best) in [
+            ("yolox-nan", Some("yolox-nano")),
+            ("yolo-nano-depth", Some("yolox-nano-depth")),
+            // A config is nearer.
+            ("depth-ekff", None),
+            ("zzz", None),
+        ] {
+            let configs = ["depth-ekf"].into_iter();
+            assert_eq!(nearest_installed(wanted, &installed, configs), best, "{wanted}");
+        }
     }
 
     #[test]
@@ -287,10 +292,11 @@ mod tests {
     #[test]
     fn a_folder_of_images_is_answered_with_the_import() {
         let home = tempfile::tempdir().unwrap();
-        let refused = || check_log_path(home.path()).unwrap_err().message;
-        assert!(refused().contains("it holds no .mcap and no .db3"), "{}", refused());
+        let why = check_log_path(home.path()).unwrap_err().message;
+        assert!(why.contains("it holds no .mcap and no .db3"), "{why}");
         fs::write(home.path().join("1.JPG"), "").unwrap();
-        assert!(refused().contains("`tagalong import images "), "{}", refused());
+        let why = check_log_path(home.path()).unwrap_err().message;
+        assert!(why.contains("`tagalong import images "), "{why}");
     }
 
     #[test]

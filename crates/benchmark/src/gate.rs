@@ -30,9 +30,9 @@ impl Rule {
     /// # Errors
     /// The mistake, with a correct example.
     pub fn parse(text: &str) -> Result<Self, Failure> {
-        let wrong = |why: String| Failure::usage(format!("--fail-if {text}: {why}"));
         let Some(at) = text.find(['<', '>']) else {
-            return Err(wrong("expected FIGURE<CHANGE or FIGURE>CHANGE, as in HOTA<-0.01".into()));
+            let why = "expected FIGURE<CHANGE or FIGURE>CHANGE, as in HOTA<-0.01";
+            return Err(refused_gate(text, why));
         };
         let name = text[..at].trim();
         let bound = text[at + 1..].trim();
@@ -46,11 +46,11 @@ impl Rule {
         if !known.contains_key(figure) {
             let hint = nearest(figure, known.keys().map(String::as_str));
             let hint = hint.map(|name| format!("; did you mean `{name}`?")).unwrap_or_default();
-            return Err(wrong(format!("no figure `{figure}`{hint}")));
+            return Err(refused_gate(text, &format!("no figure `{figure}`{hint}")));
         }
         let bound = match bound.parse::<f64>() {
             Ok(bound) if bound.is_finite() => bound,
-            _ => return Err(wrong(format!("`{bound}` is no number"))),
+            _ => return Err(refused_gate(text, &format!("`{bound}` is no number"))),
         };
         let below = text[at..].starts_with('<');
         Ok(Self { text: text.to_owned(), on_floor, figure: figure.to_owned(), below, bound })
@@ -73,6 +73,11 @@ impl Rule {
             }
         }
     }
+}
+
+/// The refusal of an argument of `--fail-if`.
+fn refused_gate(text: &str, why: &str) -> Failure {
+    Failure::usage(format!("--fail-if {text}: {why}"))
 }
 
 /// Baseline and rules of a comparison.

@@ -13,7 +13,9 @@ use tagalong_eval::{
 };
 use tagalong_log::LogFrame;
 use tagalong_pipeline::FrameReport;
-use tagalong_report::{Dropped, EventRow, StageTiming, TaskResult, TaskTiming, Trajectory};
+use tagalong_report::{
+    Dropped, EventRow, MissedPerson, StageTiming, TaskResult, TaskTiming, Trajectory,
+};
 
 use super::misses::{DroppedPlaces, missed};
 use super::store::Recording;
@@ -90,10 +92,10 @@ impl Watch {
     /// Returns the times of the frames.
     pub fn timing(&self) -> TaskTiming {
         let all = self.times.summary();
-        let of = |stage: &str| all.get(stage).cloned().unwrap_or_default();
-        let whole = of(WHOLE_FRAME);
+        let whole = all.get(WHOLE_FRAME).cloned().unwrap_or_default();
         let stages = self.stages.iter().map(|stage| {
-            let StageTimes { p50_ms, p95_ms, p99_ms, max_ms, .. } = of(stage);
+            let times = all.get(*stage).cloned().unwrap_or_default();
+            let StageTimes { p50_ms, p95_ms, p99_ms, max_ms, .. } = times;
             StageTiming { stage: (*stage).to_owned(), p50_ms, p95_ms, p99_ms, max_ms }
         });
         TaskTiming {
@@ -140,31 +142,44 @@ fn score(
     dropped: &DroppedPlaces,
     result: &mut TaskResult,
 ) -> Result<(), String> {
-    let mut missed_people = Vec::new();
-    let mut measured = |similarity: Similarity| -> Result<Option<(Tally, Vec<Event>)>, String> {
-        let Some(sequence) = comparable(sequence, similarity) else { return Ok(None) };
-        let comparison = comparison(truth, similarity);
-        let prepared =
-            Prepared::new(&sequence, &comparison).map_err(|error| with_remedy(&error))?;
-        let (_, matches) = Clear::measure(&prepared);
-        if similarity == Similarity::Iou {
-            missed_people = missed(&sequence, &prepared, &matches, dropped);
-        }
-        let tally = Tally::measure(&sequence, &comparison, &SetDistance::default());
-        let tally = tally.map_err(|error| error.to_string())?;
-        Ok(Some((tally, events(&prepared, &matches))))
-    };
-    let image = measured(Similarity::Iou)?;
-    let metres = measured(Similarity::Metres)?;
-    result.image = image.as_ref().map(|(tally, _)| tally.scores());
-    result.metres = metres.as_ref().map(|(tally, _)| tally.scores());
-    if let Some((tally, _)) = &image {
-        result.lamr_curve = tally.detections.curve();
+    let mut image = measure_in(sequence, truth, dropped, Similarity::Iou)?;
+    let metres = measure_in(sequence, truth, dropped, Similarity::Metres)?;
+    result.image = image.as_ref().map(|measured| measured.tally.scores());
+    result.metres = metres.as_ref().map(|measured| measured.tally.scores());
+    if let Some(measured) = &mut image {
+        result.lamr_curve = measured.tally.detections.curve();
+        result.missed = std::mem::take(&mut measured.missed);
     }
-    result.missed = missed_people;
-    let happened = image.or(metres).map(|(_, events)| events).unwrap_or_default();
+    let happened = image.or(metres).map(|measured| measured.events).unwrap_or_default();
     result.events = happened.iter().map(|event| EventRow::new(event, 0)).collect();
     Ok(())
+}
+
+/// One comparison of the tracks with the truth.
+struct Measured {
+    tally: Tally,
+    events: Vec<Event>,
+    missed: Vec<MissedPerson>,
+}
+
+/// Compares in the image or on the floor, where the truth has that. People are missed in the image.
+fn measure_in(
+    sequence: &Sequence,
+    truth: &TruthFile,
+    dropped: &DroppedPlaces,
+    similarity: Similarity,
+) -> Result<Option<Measured>, String> {
+    let Some(sequence) = comparable(sequence, similarity) else { return Ok(None) };
+    let comparison = comparison(truth, similarity);
+    let prepared = Prepared::new(&sequence, &comparison).map_err(|error| with_remedy(&error))?;
+    let (_, matches) = Clear::measure(&prepared);
+    let missed = match similarity {
+        Similarity::Iou => missed(&sequence, &prepared, &matches, dropped),
+        Similarity::Metres => Vec::new(),
+    };
+    let tally = Tally::measure(&sequence, &comparison, &SetDistance::default());
+    let tally = tally.map_err(|error| error.to_string())?;
+    Ok(Some(Measured { tally, events: events(&prepared, &matches), missed }))
 }
 
 /// Returns the figures with one kind of error repaired, by boxes if the truth has them, otherwise by

@@ -205,22 +205,26 @@ pub fn work_through<T: Send>(
     step: impl Fn(T) -> ControlFlow<()> + Sync,
 ) {
     let queue = Mutex::new(queue);
-    let work = || loop {
+    std::thread::scope(|scope| {
+        // One job fewer: the calling thread works, too.
+        for _ in 1..jobs {
+            // Without another thread, those that run do its work.
+            let _ = std::thread::Builder::new().spawn_scoped(scope, || empty_queue(&queue, &step));
+        }
+        empty_queue(&queue, &step);
+    });
+}
+
+/// Does the next step until the queue is empty, which a step can make it.
+fn empty_queue<T>(queue: &Mutex<VecDeque<T>>, step: &impl Fn(T) -> ControlFlow<()>) {
+    loop {
         let Some(item) = queue.lock().unwrap_or_else(PoisonError::into_inner).pop_front() else {
             return;
         };
         if step(item).is_break() {
             queue.lock().unwrap_or_else(PoisonError::into_inner).clear();
         }
-    };
-    std::thread::scope(|scope| {
-        // One job fewer: the calling thread works, too.
-        for _ in 1..jobs {
-            // Without another thread, those that run do its work.
-            let _ = std::thread::Builder::new().spawn_scoped(scope, work);
-        }
-        work();
-    });
+    }
 }
 
 impl Desk<'_> {

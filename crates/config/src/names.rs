@@ -90,12 +90,17 @@ mod tests {
         for name in ["people.toml", "people-two.toml", "peopel.onnx"] {
             fs::write(home.path().join(name), "").unwrap();
         }
-        let hint = |name: &str| model_hint(&home.path().join(name), &["yolox-nano".to_owned()]);
-        assert_eq!(hint("peple.toml"), "; did you mean `people.toml`?");
-        assert_eq!(hint("people.onnx"), "; did you mean `peopel.onnx`?");
-        assert_eq!(hint("yolox-nan"), "; did you mean `yolox-nano`?", "the name of no file");
-        assert_eq!(hint("zebra.toml"), "");
-        let itself = model_hint("yolox-nano".as_ref(), &["yolox-nano".to_owned()]);
+        let installed = ["yolox-nano".to_owned()];
+        for (name, hint) in [
+            ("peple.toml", "; did you mean `people.toml`?"),
+            ("people.onnx", "; did you mean `peopel.onnx`?"),
+            // The name of no file.
+            ("yolox-nan", "; did you mean `yolox-nano`?"),
+            ("zebra.toml", ""),
+        ] {
+            assert_eq!(model_hint(&home.path().join(name), &installed), hint, "{name}");
+        }
+        let itself = model_hint("yolox-nano".as_ref(), &installed);
         assert_eq!(itself, "", "the name was not mistyped");
     }
 }

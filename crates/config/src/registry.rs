@@ -84,13 +84,13 @@ impl Context {
             return parse(built_in).map_err(|why| Error::Model { path: String::new(), why });
         }
         let path = self.base_dir.join(file);
-        let broken = |why: String| Error::Model { path: path.display().to_string(), why };
         let text = read_text(&path, FileLimit::Model).map_err(|error| {
             let is_missing = error.kind() == ErrorKind::NotFound;
             let hint = if is_missing { model_hint(&path, &[]) } else { String::new() };
-            broken(format!("{error}{hint}"))
-        })?;
-        parse(&text).map_err(broken)
+            format!("{error}{hint}")
+        });
+        text.and_then(|text| parse(&text))
+            .map_err(|why| Error::Model { path: path.display().to_string(), why })
     }
 }
 

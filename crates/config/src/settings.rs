@@ -146,9 +146,8 @@ fn list_out_of_range(
     path: &str,
 ) -> Option<(String, String)> {
     let count = items.len() as f64;
-    let limit = |key: &str, default| schema[key].as_f64().unwrap_or(default);
-    let least = limit("minItems", 0.0);
-    let most = limit("maxItems", f64::INFINITY);
+    let least = schema["minItems"].as_f64().unwrap_or(0.0);
+    let most = schema["maxItems"].as_f64().unwrap_or(f64::INFINITY);
     if !(least..=most).contains(&count) {
         return Some((path.to_owned(), format!("must have {least} to {most} values, not {count}")));
     }
@@ -169,12 +168,11 @@ struct Range {
 
 impl Range {
     fn of(schema: &serde_json::Value) -> Self {
-        let bound = |key: &str| schema[key].as_f64();
         Self {
-            least: bound("minimum"),
-            most: bound("maximum"),
-            above: bound("exclusiveMinimum"),
-            below: bound("exclusiveMaximum"),
+            least: schema["minimum"].as_f64(),
+            most: schema["maximum"].as_f64(),
+            above: schema["exclusiveMinimum"].as_f64(),
+            below: schema["exclusiveMaximum"].as_f64(),
         }
     }
 
@@ -363,7 +361,7 @@ fn write_table(
     schema: &serde_json::Value,
     root: &serde_json::Value,
 ) {
-    let property = |key: &str| resolve(&schema["properties"][key], root);
+    let properties = &schema["properties"];
     let mut keys: Vec<&str> = table.keys().map(String::as_str).collect();
     if let Some(declared) = schema["properties"].as_object() {
         let order: Vec<&str> = declared.keys().map(String::as_str).collect();
@@ -374,18 +372,18 @@ fn write_table(
     let (tables, plain): (Vec<_>, Vec<_>) =
         keys.into_iter().partition(|key| table[*key].is_table());
     for key in plain {
-        comment(out, property(key).0);
+        comment(out, resolve(&properties[key], root).0);
         let _ = writeln!(out, "{key} = {}", table[key]);
     }
     let (absent_tables, absent): (Vec<_>, Vec<_>) = absent(schema, table)
         .into_iter()
-        .partition(|key| property(key).1["properties"].is_object());
+        .partition(|key| resolve(&properties[*key], root).1["properties"].is_object());
     for key in absent {
-        comment(out, property(key).0);
+        comment(out, resolve(&properties[key], root).0);
         let _ = writeln!(out, "# {key} =");
     }
     for key in tables {
-        let (text, inner) = property(key);
+        let (text, inner) = resolve(&properties[key], root);
         let name = join(path, key);
         out.push('\n');
         comment(out, text);
@@ -395,7 +393,7 @@ fn write_table(
         }
     }
     for key in absent_tables {
-        write_absent_table(out, &join(path, key), property(key), root);
+        write_absent_table(out, &join(path, key), resolve(&properties[key], root), root);
     }
 }
 
@@ -516,17 +514,25 @@ mod tests {
     #[test]
     fn the_place_of_a_mistake_is_marked_in_its_line() {
         let text = "one = 1\ntwo = true\n";
-        let at = |span| ConfigError { message: "wrong".into(), span }.render("a.toml", text);
-        assert_eq!(at(None), "a.toml: wrong");
-        assert_eq!(at(Some(99..100)), "a.toml: wrong", "beyond the end");
-        assert_eq!(at(Some(14..18)), "a.toml:2:7: wrong\n  |\n2 | two = true\n  |       ^^^^");
-        assert_eq!(at(Some(14..90)).lines().last(), Some("  |       ^"));
-        assert_eq!(
-            at(Some(8..19)).lines().last(),
-            Some("  | ^^^^^^^^^^"),
-            "no longer than the line"
-        );
-        assert_eq!(at(Some(19..19)).lines().next(), Some("a.toml:3:1: wrong"), "at the end");
+        for (span, whole) in [
+            (None, "a.toml: wrong"),
+            // Beyond the end.
+            (Some(99..100), "a.toml: wrong"),
+            (Some(14..18), "a.toml:2:7: wrong\n  |\n2 | two = true\n  |       ^^^^"),
+        ] {
+            assert_eq!(ConfigError { message: "wrong".into(), span }.render("a.toml", text), whole);
+        }
+        // A mark is no longer than the line, and there is one at the end too.
+        for (span, first, last) in [
+            (14..90, "a.toml:2:7: wrong", "  |       ^"),
+            (8..19, "a.toml:2:1: wrong", "  | ^^^^^^^^^^"),
+            (19..19, "a.toml:3:1: wrong", "  | ^"),
+        ] {
+            let span = Some(span);
+            let shown = ConfigError { message: "wrong".into(), span }.render("a.toml", text);
+            assert_eq!(shown.lines().next(), Some(first));
+            assert_eq!(shown.lines().last(), Some(last));
+        }
     }
 
     #[test]

@@ -85,25 +85,24 @@ fn check_pair(
 
 /// Checks that the weights of a track, and of a detection, sum to at most 1.
 fn check_sums(answer: &Associations, tracks: usize, detections: usize) -> Verdict {
-    let sum = |is_of: &dyn Fn(&Association) -> bool| -> f64 {
-        answer.pairs.iter().filter(|pair| is_of(pair)).map(|pair| pair.weight).sum()
-    };
-    let of_tracks = (0..tracks).map(|at| sum(&|pair| pair.track == at));
-    let of_detections = (0..detections).map(|at| sum(&|pair| pair.detection == at));
+    let of_tracks = (0..tracks).map(|at| weight_of(answer, |pair| pair.track == at));
+    let of_detections = (0..detections).map(|at| weight_of(answer, |pair| pair.detection == at));
     let most = of_tracks.chain(of_detections).fold(0.0, f64::max);
     // Allows for the rounding of the sum.
     demand(most <= 1.0 + 1e-9, || format!("weights sum to {most}: {:?}", answer.pairs))
 }
 
+/// The sum of the weights of some of the pairs.
+fn weight_of(answer: &Associations, is_counted: impl Fn(&Association) -> bool) -> f64 {
+    answer.pairs.iter().filter(|pair| is_counted(pair)).map(|pair| pair.weight).sum()
+}
+
 fn repeatable(subject: &Subject<'_>) -> Verdict {
     let defaults = subject.info.defaults();
     let (tracks, detections) = crowd(&mut SplitMix64::new(8), 6, 8);
-    let answer = |from| -> Result<_, String> {
-        Ok(subject.associator(from)?.associate(&tracks, &detections, &GATE))
-    };
     // Built without settings, and from the printed defaults, which must mean the same.
-    let first = answer(From::Nothing)?;
-    let second = answer(From::Text(&defaults))?;
+    let first = subject.associator(From::Nothing)?.associate(&tracks, &detections, &GATE);
+    let second = subject.associator(From::Text(&defaults))?.associate(&tracks, &detections, &GATE);
     demand(first == second, || format!("two answers differ: {first:?} and {second:?}"))
 }
 

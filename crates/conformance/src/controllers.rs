@@ -61,16 +61,18 @@ fn open_space(index: u64, people: &[Figure]) -> Frame {
 }
 
 fn repeatable(subject: &Subject<'_>) -> Verdict {
-    let frame = open_space(1, &[Figure::at(2.0, 0.4)]);
-    let drive = |from| -> Result<Vec<Twist>, String> {
-        let controller = &mut *subject.controller(from)?;
-        let steps = (0..10).map(|i| target(2.0 + 0.1 * f64::from(i), 0.4, Vector2::new(1.0, 0.0)));
-        Ok(steps.map(|t| command(controller, &frame, Some(&t))).collect())
-    };
     let defaults = subject.info.defaults();
-    let first = drive(From::Nothing)?;
-    let second = drive(From::Text(&defaults))?;
+    let first = drive_after(subject, From::Nothing)?;
+    let second = drive_after(subject, From::Text(&defaults))?;
     demand(first == second, || format!("two runs differ: {first:?} and {second:?}"))
+}
+
+/// The commands after a target that walks away.
+fn drive_after(subject: &Subject<'_>, from: From<'_>) -> Result<Vec<Twist>, String> {
+    let frame = open_space(1, &[Figure::at(2.0, 0.4)]);
+    let controller = &mut *subject.controller(from)?;
+    let steps = (0..10).map(|i| target(2.0 + 0.1 * f64::from(i), 0.4, Vector2::new(1.0, 0.0)));
+    Ok(steps.map(|t| command(controller, &frame, Some(&t))).collect())
 }
 
 /// Checks the stop also right after a target was followed at speed.

@@ -214,12 +214,10 @@ fn question_alone(subject: &Subject<'_>) -> Verdict {
     for frame in frames.iter().rev() {
         for query in [EVERYWHERE, Query::Track(&followed)] {
             let mut fresh = subject.detector(From::Nothing)?;
-            let answer = |detector: &mut dyn Detector| {
+            let [then, now] = [&mut *fresh, &mut *seasoned].map(|detector| {
                 let mut funnel = Funnel::default();
                 (detector.detect(frame, &query, &mut funnel).map_err(|e| e.to_string()), funnel)
-            };
-            let then = answer(&mut *fresh);
-            let now = answer(&mut *seasoned);
+            });
             demand(then == now, || {
                 format!("frame {}: a fresh one says {then:?}, after the walk {now:?}", frame.index)
             })?;

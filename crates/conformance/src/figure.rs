@@ -83,16 +83,18 @@ impl World {
         let eye = Vector3::new(0.0, 0.0, SCANNER_HEIGHT_M);
         // Another stream of numbers than that of the depth image.
         let mut random = self.noise_seed.map(|seed| SplitMix64::new(!seed));
-        let mut reflection = |ray: u32| {
+        let mut rays = Vec::new();
+        let mut points = Vec::new();
+        for ray in 0..RAYS {
             let angle = (f64::from(ray) / f64::from(RAYS - 1) - 0.5) * std::f64::consts::PI;
             let direction = Vector3::new(angle.cos(), angle.sin(), 0.0);
             let noise_m = random.as_mut().map_or(0.0, |random| SCANNER_SIGMA_M * random.normal());
-            let hit = self.cast(&shapes, eye, direction);
-            let range_m =
-                hit.map(|hit| hit.depth_m).filter(|range_m| *range_m < SCANNER_RANGE_M)?;
-            Some((ray, Point3::from(eye + direction * (range_m + noise_m))))
-        };
-        let (rays, points): (Vec<u32>, Vec<_>) = (0..RAYS).filter_map(&mut reflection).unzip();
+            let hit = self.cast(&shapes, eye, direction).map(|hit| hit.depth_m);
+            if let Some(range_m) = hit.filter(|range_m| *range_m < SCANNER_RANGE_M) {
+                rays.push(ray);
+                points.push(Point3::from(eye + direction * (range_m + noise_m)));
+            }
+        }
         let increment_rad = std::f64::consts::PI / f64::from(RAYS - 1);
         LaserScan::of_points(points)
             .with_scanner(Isometry3::from_parts(eye.into(), Default::default()))
@@ -191,10 +193,10 @@ const HIP_M: f64 = 0.80;
 fn body(figure: &Figure) -> impl Iterator<Item = Ellipsoid> {
     // The legs keep a positive length for a head at or below the height of the hip.
     let half_leg = (0.5 * (figure.head.z - HIP_M)).max(0.1);
-    let leg = |across| -> Part {
+    let legs = [0.09, -0.09].map(|across| -> Part {
         ([-0.04, across, HIP_M + half_leg], [0.09, 0.08, half_leg + 0.03], [50, 50, 60])
-    };
-    let parts = UPPER_PARTS.into_iter().chain([leg(0.09), leg(-0.09)]);
+    });
+    let parts = UPPER_PARTS.into_iter().chain(legs);
     let Figure { head, heading_rad } = *figure;
     let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), heading_rad);
     parts.map(move |([along, across, below], half, colour)| Ellipsoid {
@@ -251,9 +253,8 @@ mod tests {
         let depth = images.depth.unwrap();
         let square = camera.upper_body(&figure.head);
         let row = depth.row(square.bottom() as usize - 1);
-        let near = |x: &usize| row[*x] < 3.0;
-        let left = (0..640).find(near).unwrap();
-        let right = (0..640).rfind(near).unwrap();
+        let left = (0..640).find(|x| row[*x] < 3.0).unwrap();
+        let right = (0..640).rfind(|x| row[*x] < 3.0).unwrap();
         let width = (right - left) as f64 / square.width;
         assert!((0.75..1.0).contains(&width), "shoulders take {width} of the square");
     }
@@ -278,11 +279,10 @@ mod tests {
     #[test]
     fn noise_is_seeded_and_small() {
         let camera = camera(0.0);
-        let drawn =
-            |seed| World { noise_seed: seed, ..World::with(&[]) }.draw(&camera).depth.unwrap();
-        assert_eq!(format!("{:?}", drawn(Some(3))), format!("{:?}", drawn(Some(3))));
-        let clean = drawn(None);
-        let noisy = drawn(Some(3));
+        let [clean, noisy, again] = [None, Some(3), Some(3)].map(|noise_seed| {
+            World { noise_seed, ..World::with(&[]) }.draw(&camera).depth.unwrap()
+        });
+        assert_eq!(format!("{noisy:?}"), format!("{again:?}"));
         let both = clean.pixels().iter().zip(noisy.pixels()).filter(|(c, _)| **c < 5.0);
         let errors: Vec<f64> = both.map(|(c, n)| f64::from(n - c)).collect();
         let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();

@@ -167,17 +167,22 @@ fn odd_frames_are_survived(subject: &Subject<'_>) -> Verdict {
 
 fn repeatable(subject: &Subject<'_>) -> Verdict {
     let defaults = subject.info.defaults();
-    let watch = |from| -> Result<_, String> {
-        let mut run = Run::new(subject, from, driving())?;
-        run.start(&COUPLE);
-        for _ in 0..15 {
-            run.step(&[(1, COUPLE[0]), (2, COUPLE[1])])?;
-        }
-        Ok(run.estimates())
-    };
-    let first = watch(From::Nothing)?;
-    let second = watch(From::Text(&defaults))?;
+    let first = couple_watched(subject, From::Nothing)?;
+    let second = couple_watched(subject, From::Text(&defaults))?;
     demand(first == second, || format!("two runs differ: {first:?} and {second:?}"))
+}
+
+/// The estimates after two people were watched from a driving robot.
+fn couple_watched(
+    subject: &Subject<'_>,
+    from: From<'_>,
+) -> Result<BTreeMap<TrackId, Estimate>, String> {
+    let mut run = Run::new(subject, from, driving())?;
+    run.start(&COUPLE);
+    for _ in 0..15 {
+        run.step(&[(1, COUPLE[0]), (2, COUPLE[1])])?;
+    }
+    Ok(run.estimates())
 }
 
 fn covariance_stays_positive(subject: &Subject<'_>) -> Verdict {
@@ -263,16 +268,15 @@ fn coasts(run: &mut Run, place: &Point3<f64>) -> Verdict {
 fn walking_person(subject: &Subject<'_>) -> Verdict {
     let mut run = Run::new(subject, From::Nothing, EgoMotion::at_rest(DT_S))?;
     let velocity = Vector2::new(0.3, 0.7);
-    let place = |i: u32| {
-        let floor = Vector2::new(2.5, -1.5) + velocity * (DT_S * f64::from(i));
-        Point3::new(floor.x, floor.y, 1.6)
-    };
-    run.start(&[place(0)]);
+    let mut place = Point3::new(2.5, -1.5, 1.6);
+    run.start(&[place]);
     for i in 1..=40 {
-        run.step(&[(1, place(i))])?;
+        let floor = Vector2::new(2.5, -1.5) + velocity * (DT_S * f64::from(i));
+        place = Point3::new(floor.x, floor.y, 1.6);
+        run.step(&[(1, place)])?;
     }
     let (position, seen_velocity) = run.in_world(1)?;
-    let away = (position - place(40).xy()).norm();
+    let away = (position - place.xy()).norm();
     let wrong = (seen_velocity - velocity).norm();
     demand(away < 0.25 && wrong < 0.4, || {
         format!("after 4 s it is {away:.2} m off and {wrong:.2} m/s wrong")

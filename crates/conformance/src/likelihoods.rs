@@ -65,9 +65,11 @@ fn batches_agree(subject: &Subject<'_>) -> Verdict {
         let near = Figure::at(2.0, 0.1);
         let far = Figure::at(3.0, -0.1);
         let frame = drawn(1, &level(), &[near, far]);
-        let aside = |m: f64| standing(far.head + nalgebra::Vector3::new(0.0, m, 0.0));
-        let people: Vec<Person> =
-            [-0.4, 0.0, 0.4].iter().flat_map(|m| [standing(near.head), aside(*m)]).collect();
+        let mut people: Vec<Person> = Vec::new();
+        for aside_m in [-0.4, 0.0, 0.4] {
+            let aside = far.head + nalgebra::Vector3::new(0.0, aside_m, 0.0);
+            people.extend([near.head, aside].map(standing));
+        }
         let mut many = Vec::new();
         let asked = likelihood.log_likelihoods(&frame, &people, 2, &mut many);
         asked.map_err(|error| format!("it fails: {error}"))?;

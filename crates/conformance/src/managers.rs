@@ -113,7 +113,20 @@ impl Run {
 
 fn repeatable(subject: &Subject<'_>) -> Verdict {
     let defaults = subject.info.defaults();
-    let watch = |from| -> Result<_, String> {
+    let first = Watched::of(subject, From::Nothing)?;
+    let second = Watched::of(subject, From::Text(&defaults))?;
+    demand(first == second, || format!("two runs differ: {first:?} and {second:?}"))
+}
+
+/// Tracks of two people, of which one is missed now and then.
+#[derive(Debug, PartialEq)]
+struct Watched {
+    health: Vec<(bool, f64)>,
+    ended: Vec<(TrackId, &'static str)>,
+}
+
+impl Watched {
+    fn of(subject: &Subject<'_>, from: From<'_>) -> Result<Self, String> {
         let mut run = Run::new(subject, from)?;
         let a = run.start(0.0)?;
         let b = run.start(1.0)?;
@@ -123,11 +136,8 @@ fn repeatable(subject: &Subject<'_>) -> Verdict {
             run.step(&[(a, DETECTED), (b, missed)])?;
             health.extend(run.tracks.values().map(|track| (track.confirmed, track.score)));
         }
-        Ok((health, run.ended))
-    };
-    let first = watch(From::Nothing)?;
-    let second = watch(From::Text(&defaults))?;
-    demand(first == second, || format!("two runs differ: {first:?} and {second:?}"))
+        Ok(Self { health, ended: run.ended })
+    }
 }
 
 fn detected_is_confirmed(subject: &Subject<'_>) -> Verdict {

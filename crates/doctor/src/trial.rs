@@ -99,10 +99,11 @@ fn picture(frame: &Frame, place: &Rect) -> Option<RgbImage> {
         let dx = x as f64 - half;
         let dy = y as f64 - half;
         let at = [centre.x + scale * dx, centre.y + scale * dy].map(|v| v.floor() as i64);
-        let edge = |d: f64, side: f64| ((d.abs() * scale) - 0.5 * side).abs() < 0.5 * scale;
-        let inside = |d: f64, side: f64| d.abs() * scale <= 0.5 * side + 0.5 * scale;
-        let on_frame = edge(dx, place.width) && inside(dy, place.height)
-            || edge(dy, place.height) && inside(dx, place.width);
+        let beyond_x = dx.abs() * scale - 0.5 * place.width;
+        let beyond_y = dy.abs() * scale - 0.5 * place.height;
+        let line = 0.5 * scale;
+        let on_frame = beyond_x.abs() < line && dy.abs() * scale <= 0.5 * place.height + line
+            || beyond_y.abs() < line && dx.abs() * scale <= 0.5 * place.width + line;
         if on_frame { [255, 220, 0] } else { image.get(at[0], at[1]).unwrap_or([24, 24, 28]) }
     }))
 }

@@ -60,15 +60,19 @@ pub fn chi_square_quantile(probability: f64, freedom: f64) -> Option<f64> {
     if !sensible {
         return None;
     }
-    let below = |x: f64| match x {
-        x if x <= 0.0 => 0.0,
-        x => checked_gamma_lr(0.5 * freedom, 0.5 * x).unwrap_or(1.0),
-    };
     let mut high = freedom + 10.0;
-    while below(high) < probability {
+    while chi_square_below(high, freedom) < probability {
         high *= 2.0;
     }
-    Some(bisect(0.0, high, |x| below(x) < probability))
+    Some(bisect(0.0, high, |x| chi_square_below(x, freedom) < probability))
+}
+
+/// The probability that a chi-square variable lies below a value.
+fn chi_square_below(x: f64, freedom: f64) -> f64 {
+    if x <= 0.0 {
+        return 0.0;
+    }
+    checked_gamma_lr(0.5 * freedom, 0.5 * x).unwrap_or(1.0)
 }
 
 /// The point in between where `too_low` turns from true to false.

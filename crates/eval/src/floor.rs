@@ -205,14 +205,17 @@ impl FloorClear {
     /// Returns the number of false positives a minute; its interval is by the spread between blocks
     /// of `block` scans. The scans lie `scan_s` seconds apart.
     pub fn false_per_minute(&self, block: usize, scan_s: f64) -> Option<Interval> {
-        let rate = |scans: &[u64]| {
-            scans.iter().sum::<u64>() as f64 * 60.0 / (scans.len().max(1) as f64 * scan_s)
-        };
-        let rates: Vec<f64> = self.false_by_scan.chunks(block.max(1)).map(rate).collect();
-        let whole = rate(&self.false_by_scan);
+        let blocks = self.false_by_scan.chunks(block.max(1));
+        let rates: Vec<f64> = blocks.map(|scans| minute_rate(scans, scan_s)).collect();
+        let whole = minute_rate(&self.false_by_scan, scan_s);
         let spread = mean_interval(&rates)?;
         Some(Interval { estimate: whole, ..spread.within(0.0, f64::INFINITY) })
     }
+}
+
+/// The mean count of a minute, from the counts of scans that take this time each.
+fn minute_rate(scans: &[u64], scan_s: f64) -> f64 {
+    scans.iter().sum::<u64>() as f64 * 60.0 / (scans.len().max(1) as f64 * scan_s)
 }
 
 #[cfg(test)]

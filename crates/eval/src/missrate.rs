@@ -1,7 +1,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::ratio;
-use crate::types::{Frame, Report, Role, Sequence, Similarity, Truth};
+use crate::types::{Frame, Region, Report, Role, Sequence, Similarity, Truth};
 
 /// False positives per image at which the miss rate is read.
 pub const REFERENCE_FPPI: [f64; 9] =
@@ -182,11 +182,14 @@ impl Judge {
 
     fn ignored(&self, frame: &Frame, report: &Report) -> bool {
         let mut ignored = frame.truths.iter().filter(|t| t.role == Role::Ignored);
-        // Over the detection's own area: an ignored truth may hold a whole crowd.
-        let inside = |region| report.region.is_some_and(|r| r.covered_by(region) >= self.at_least);
         ignored.any(|truth| match (self.similarity, &truth.region) {
-            (Similarity::Iou, Some(region)) => inside(region),
+            (Similarity::Iou, Some(region)) => self.is_inside(report, region),
             _ => self.similarity.between(truth, report) >= self.at_least,
-        }) || frame.ignore_regions.iter().any(inside)
+        }) || frame.ignore_regions.iter().any(|region| self.is_inside(report, region))
+    }
+
+    /// Over the detection's own area: an ignored truth may hold a whole crowd.
+    fn is_inside(&self, report: &Report, region: &Region) -> bool {
+        report.region.is_some_and(|r| r.covered_by(region) >= self.at_least)
     }
 }

@@ -128,15 +128,14 @@ impl Tally {
 
     fn add_rates(&self, scores: &mut Scores) {
         let any = self.truths > 0;
-        let hota = |figure: fn(&HotaLevel) -> f64| any.then(|| self.hota.mean(figure));
-        scores.hota = hota(HotaLevel::hota);
-        scores.det_a = hota(HotaLevel::det_a);
-        scores.ass_a = hota(HotaLevel::ass_a);
-        scores.loc_a = hota(HotaLevel::loc_a);
-        scores.det_re = hota(HotaLevel::det_re);
-        scores.det_pr = hota(HotaLevel::det_pr);
-        scores.ass_re = hota(HotaLevel::ass_re);
-        scores.ass_pr = hota(HotaLevel::ass_pr);
+        scores.hota = any.then(|| self.hota.mean(HotaLevel::hota));
+        scores.det_a = any.then(|| self.hota.mean(HotaLevel::det_a));
+        scores.ass_a = any.then(|| self.hota.mean(HotaLevel::ass_a));
+        scores.loc_a = any.then(|| self.hota.mean(HotaLevel::loc_a));
+        scores.det_re = any.then(|| self.hota.mean(HotaLevel::det_re));
+        scores.det_pr = any.then(|| self.hota.mean(HotaLevel::det_pr));
+        scores.ass_re = any.then(|| self.hota.mean(HotaLevel::ass_re));
+        scores.ass_pr = any.then(|| self.hota.mean(HotaLevel::ass_pr));
         scores.mota = any.then(|| self.clear.mota());
         scores.motp = (self.clear.tp > 0).then(|| self.clear.motp());
         scores.idf1 = any.then(|| self.identity.idf1());

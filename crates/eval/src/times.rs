@@ -128,9 +128,9 @@ impl Following {
             let frame = &prepared.frames[index];
             let track = followed.get(index).copied().flatten();
             let person = track.and_then(|track| {
-                let of_track =
-                    |m: &&Match| prepared.track_ids[frame.tracks[m.col as usize] as usize] == track;
-                let m = matches.get(index)?.iter().find(of_track)?;
+                let mut matches = matches.get(index)?.iter();
+                let m = matches
+                    .find(|m| prepared.track_ids[frame.tracks[m.col as usize] as usize] == track)?;
                 Some(prepared.truth_ids[frame.truths[m.row as usize] as usize])
             });
             let on_target = person == Some(target);

@@ -139,19 +139,21 @@ fn truth_says_whose_rules_it_follows() {
 
 #[test]
 fn tracks_of_no_person_or_of_a_car_are_refused() {
-    let tracks = |id: i64, class: &str| {
-        let text = format!("1,0,0,0,9,9,1,1\n2,{id},0,0,9,9,0.5,{class},-1,-1\n");
-        mot::parse_tracks(&text, "tracks.txt")
-    };
     for class in ["-1", "0", "1"] {
-        assert_eq!(tracks(7, class).unwrap().len(), 2, "{class}");
+        let tracks = mot::parse_tracks(&two_tracks(7, class), "tracks.txt");
+        assert_eq!(tracks.unwrap().len(), 2, "{class}");
     }
-    let car = why(tracks(7, "3"));
+    let car = why(mot::parse_tracks(&two_tracks(7, "3"), "tracks.txt"));
     assert!(car.starts_with("tracks.txt, line 2: class 3; only people"), "{car}");
-    let nobody = why(tracks(-1, "-1"));
+    let nobody = why(mot::parse_tracks(&two_tracks(-1, "-1"), "tracks.txt"));
     assert!(nobody.starts_with("tracks.txt, line 2: id -1;"), "{nobody}");
     let truth = why(mot::parse_truth("1,-1,0,0,9,9,1,1,1", "gt.txt", mot::Rules::Mot17));
     assert!(truth.starts_with("gt.txt, line 1: id -1;"), "{truth}");
+}
+
+/// A table of two tracks, of which the second has this number and class.
+fn two_tracks(id: i64, class: &str) -> String {
+    format!("1,0,0,0,9,9,1,1\n2,{id},0,0,9,9,0.5,{class},-1,-1\n")
 }
 
 #[test]
@@ -372,13 +374,17 @@ fn only_a_box_or_a_place_is_required_of_a_person() {
 
 #[test]
 fn sequence_info_has_limits_and_may_leave_out_the_size() {
-    let info = |text: &str| mot::parse_info(text, "seqinfo.ini");
-    let plain = info("[Sequence]\nNAME = hall \nframerate=14\nseqLength=1000000").unwrap();
+    let plain = "[Sequence]\nNAME = hall \nframerate=14\nseqLength=1000000";
+    let plain = mot::parse_info(plain, "seqinfo.ini").unwrap();
     assert_eq!((plain.name.as_str(), plain.rate_hz, plain.length), ("hall", 14.0, 1_000_000));
     assert_eq!((plain.width, plain.height), (0, 0));
-    assert!(why(info("name=x\nframeRate=-1\nseqLength=1")).contains("expected a number"));
-    assert!(why(info("name=x\nframeRate=inf\nseqLength=1")).contains("expected a number"));
-    assert!(why(info("frameRate=1\nseqLength=1")).contains("has no `name=`"));
+    for (text, words) in [
+        ("name=x\nframeRate=-1\nseqLength=1", "expected a number"),
+        ("name=x\nframeRate=inf\nseqLength=1", "expected a number"),
+        ("frameRate=1\nseqLength=1", "has no `name=`"),
+    ] {
+        assert!(why(mot::parse_info(text, "seqinfo.ini")).contains(words), "{text}");
+    }
 }
 
 #[test]

@@ -369,9 +369,9 @@ fn what_is_counted_adds_up_field_by_field() {
     }
 
     fn sets(n: u64) -> SetTally {
-        let of = |factor: f64| factor * n as f64;
-        let parts = GospaParts { location: of(3.0), missed: of(4.0), false_: of(5.0) };
-        SetTally { ospa_sum: of(1.0), gospa_sum: of(2.0), parts, frames: n }
+        let one = n as f64;
+        let parts = GospaParts { location: 3.0 * one, missed: 4.0 * one, false_: 5.0 * one };
+        SetTally { ospa_sum: one, gospa_sum: 2.0 * one, parts, frames: n }
     }
 
     fn times(numbers: &[f64], n: u64) -> Times {
@@ -405,15 +405,15 @@ fn what_is_counted_adds_up_field_by_field() {
     let mut hota = [Hota::default(), Hota::default(), Hota::default()];
     for (n, of) in (1_u64..).zip(&mut hota) {
         for (step, level) in (1..).zip(&mut of.levels) {
-            let by = |factor: u64| factor * step * n;
+            let one = step * n;
             *level = HotaLevel {
-                tp: by(1),
-                fn_: by(2),
-                fp: by(3),
-                similarity_sum: by(4) as f64,
-                association_sum: by(5) as f64,
-                association_recall_sum: by(6) as f64,
-                association_precision_sum: by(7) as f64,
+                tp: one,
+                fn_: 2 * one,
+                fp: 3 * one,
+                similarity_sum: (4 * one) as f64,
+                association_sum: (5 * one) as f64,
+                association_recall_sum: (6 * one) as f64,
+                association_precision_sum: (7 * one) as f64,
             };
         }
     }

@@ -29,13 +29,14 @@ pub(crate) fn seeds() -> Vec<Vec<u8>> {
     let place = (Point2D { x: 1.0, y: 1.0 }, 0.0_f64);
     let person = (0_i32, "person".to_owned(), 0.9_f64, "7".to_owned(), (place, size));
     let empty = Detection2DArray { header: header(), ..Detection2DArray::default() };
-    let both =
-        |definition: &str, message: Vec<u8>| [definition.as_bytes(), BETWEEN, &message].concat();
-    vec![
-        both(YOLO, encode(&(header(), vec![person]))),
-        both(FOXY, encode(&empty)),
-        both(Detection2DArray::DEFINITION, encode(&empty)),
-    ]
+    let seeds = [
+        (YOLO, encode(&(header(), vec![person]))),
+        (FOXY, encode(&empty)),
+        (Detection2DArray::DEFINITION, encode(&empty)),
+    ];
+    let joined =
+        seeds.map(|(definition, message)| [definition.as_bytes(), BETWEEN, &message].concat());
+    joined.to_vec()
 }
 
 /// Reads the frames of a log that has a message of each type by this definition.

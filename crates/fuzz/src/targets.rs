@@ -64,18 +64,6 @@ const PERSON_BOXES: [&str; 2] = [
 
 /// Returns all parsers.
 pub fn targets() -> Vec<Target> {
-    let model = |name, text: &str, parse| Target {
-        name,
-        about: "a model file",
-        seeds: vec![text.as_bytes().to_vec()],
-        parse,
-    };
-    let text = |name, seed: &str, parse| Target {
-        name,
-        about: "a text format",
-        seeds: vec![seed.as_bytes().to_vec()],
-        parse,
-    };
     vec![
         Target {
             name: "mcap",
@@ -163,13 +151,13 @@ pub fn targets() -> Vec<Target> {
             seeds: vec![include_bytes!("../../../configs/scenes/follow-passing.toml").to_vec()],
             parse: |bytes, _| as_text(bytes, |text| drop(Scene::parse(text))),
         },
-        model("cascade", CASCADE, |bytes, _| {
+        model_target("cascade", CASCADE, |bytes, _| {
             as_text(bytes, |text| drop(tagalong_face_rgbd::Cascade::from_xml(text)));
         }),
-        model("body-net", &short_numbers(BODY_NET), |bytes, _| {
+        model_target("body-net", &short_numbers(BODY_NET), |bytes, _| {
             as_text(bytes, |text| drop(tagalong_body_net::Model::from_text(text)));
         }),
-        model("depth-net", &short_numbers(DEPTH_NET), |bytes, _| {
+        model_target("depth-net", &short_numbers(DEPTH_NET), |bytes, _| {
             as_text(bytes, |text| drop(tagalong_depth_net::Model::from_text(text)));
         }),
         Target {
@@ -183,36 +171,48 @@ pub fn targets() -> Vec<Target> {
                 as_text(bytes, |text| drop(tagalong_hog_upper_body::Model::from_text(text)));
             },
         },
-        model("color-texture", &first_trees(COLOR_TEXTURE), |bytes, _| {
+        model_target("color-texture", &first_trees(COLOR_TEXTURE), |bytes, _| {
             as_text(bytes, |text| drop(tagalong_color_texture::Model::from_text(text)));
         }),
-        model("omni-distance", OMNI_DISTANCE, |bytes, _| {
+        model_target("omni-distance", OMNI_DISTANCE, |bytes, _| {
             as_text(bytes, |text| drop(tagalong_omni_appearance::Model::from_text(text)));
         }),
-        model("svm-patch", &first_vectors(SVM_PATCH), |bytes, _| {
+        model_target("svm-patch", &first_vectors(SVM_PATCH), |bytes, _| {
             as_text(bytes, |text| drop(tagalong_svm_patch::Model::from_text(text)));
         }),
-        model("laser-legs", include_str!("../../../configs/models/laser-legs.toml"), |bytes, _| {
-            as_text(bytes, |text| drop(tagalong_laser_legs::Model::from_text(text)));
-        }),
-        text("mot", "1,1,10,20,30,40,1,1,0.5\n2,-1,1e1,2.5,3,4,0.9,-1,-1,-1\n", |bytes, _| {
-            as_text(bytes, |text| {
-                let rows = mot::parse(text, "x").unwrap_or_default();
-                let mut timeline = Timeline::new();
-                timeline.add_reports(rows.iter().map(mot::Row::report));
-                whole(timeline);
-                drop(mot::parse_truth(text, "x", mot::Rules::Mot17));
-                drop(mot::parse_tracks(text, "x"));
-                drop(mot::parse_info(text, "x"));
-            });
-        }),
-        text("kitti", "0 1 Pedestrian 0 0 -1.5 10 20 30 40 1.7 0.6 0.8 1 2 9 0.1\n", |bytes, _| {
-            as_text(bytes, |text| {
-                let mut timeline = Timeline::new();
-                kitti::add_truths(&mut timeline, &kitti::parse(text, "x").unwrap_or_default());
-                whole(timeline);
-            });
-        }),
+        model_target(
+            "laser-legs",
+            include_str!("../../../configs/models/laser-legs.toml"),
+            |bytes, _| {
+                as_text(bytes, |text| drop(tagalong_laser_legs::Model::from_text(text)));
+            },
+        ),
+        text_target(
+            "mot",
+            "1,1,10,20,30,40,1,1,0.5\n2,-1,1e1,2.5,3,4,0.9,-1,-1,-1\n",
+            |bytes, _| {
+                as_text(bytes, |text| {
+                    let rows = mot::parse(text, "x").unwrap_or_default();
+                    let mut timeline = Timeline::new();
+                    timeline.add_reports(rows.iter().map(mot::Row::report));
+                    whole(timeline);
+                    drop(mot::parse_truth(text, "x", mot::Rules::Mot17));
+                    drop(mot::parse_tracks(text, "x"));
+                    drop(mot::parse_info(text, "x"));
+                });
+            },
+        ),
+        text_target(
+            "kitti",
+            "0 1 Pedestrian 0 0 -1.5 10 20 30 40 1.7 0.6 0.8 1 2 9 0.1\n",
+            |bytes, _| {
+                as_text(bytes, |text| {
+                    let mut timeline = Timeline::new();
+                    kitti::add_truths(&mut timeline, &kitti::parse(text, "x").unwrap_or_default());
+                    whole(timeline);
+                });
+            },
+        ),
         Target {
             name: "people",
             about: "tables of people, on the floor and in images",
@@ -237,10 +237,20 @@ pub fn targets() -> Vec<Target> {
             seeds: PERSON_BOXES.map(|file| file.as_bytes().to_vec()).to_vec(),
             parse: |bytes, _| as_text(bytes, |text| drop(tagalong_import::person_boxes(text))),
         },
-        text("follow-bench", FOLLOW_BENCH, |bytes, _| {
+        text_target("follow-bench", FOLLOW_BENCH, |bytes, _| {
             as_text(bytes, |text| drop(tagalong_import::scene_of_follow_bench(text, "x")));
         }),
     ]
+}
+
+/// The parser of a model file, with one such file.
+fn model_target(name: &'static str, seed: &str, parse: fn(&[u8], &Path)) -> Target {
+    Target { name, about: "a model file", seeds: vec![seed.as_bytes().to_vec()], parse }
+}
+
+/// The parser of a text format, with one such text.
+fn text_target(name: &'static str, seed: &str, parse: fn(&[u8], &Path)) -> Target {
+    Target { name, about: "a text format", seeds: vec![seed.as_bytes().to_vec()], parse }
 }
 
 /// Makes the sequence of a timeline as scoring does, with all frames between those that have rows.

@@ -50,19 +50,15 @@ pub fn images(args: &ImportArgs) -> Result<Sequence, Failure> {
 pub fn mot(args: &ImportArgs) -> Result<Sequence, Failure> {
     let ini = args.path.join("seqinfo.ini");
     let about = text(&ini, "a folder of the MOTChallenge, with seqinfo.ini and img1")?;
-    let value = |key: &str| {
-        let lines = about.lines().filter_map(|line| line.split_once('='));
-        lines.map(|(name, value)| (name.trim(), value.trim())).find(|(name, _)| *name == key)
-    };
-    let fps = value("frameRate")
-        .and_then(|(_, hz)| hz.parse::<f64>().ok())
+    let fps = ini_value(&about, "frameRate")
+        .and_then(|hz| hz.parse::<f64>().ok())
         .filter(|hz| *hz > 0.0 && *hz <= MAX_HZ);
     let Some(fps) = fps else {
         let message =
             format!("{}: there is no `frameRate` above 0 and up to {MAX_HZ}", ini.display());
         return Err(Failure::failed(message));
     };
-    let folder = args.path.join(value("imDir").map_or("img1", |(_, name)| name));
+    let folder = args.path.join(ini_value(&about, "imDir").unwrap_or("img1"));
     if !folder.exists() {
         return Err(Failure::failed(format!(
             "{}: no such folder, so there are no images; `tagalong boxes FOLDER_OF_SEQUENCES` tracks \
@@ -79,6 +75,12 @@ pub fn mot(args: &ImportArgs) -> Result<Sequence, Failure> {
         sequence.recorded = Some(recorded::config(&detections)?);
     }
     Ok(sequence)
+}
+
+/// The value of a key in a `seqinfo.ini`.
+fn ini_value<'t>(text: &'t str, key: &str) -> Option<&'t str> {
+    let mut pairs = text.lines().filter_map(|line| line.split_once('='));
+    pairs.find(|(name, _)| name.trim() == key).map(|(_, value)| value.trim())
 }
 
 /// Reads images at a steady rate, with the camera of the options.

@@ -92,16 +92,13 @@ fn boxes(path: &Path) -> Result<String, Failure> {
             Some(&"Cyclist") => 2,
             _ => continue,
         };
-        let wrong =
-            || Failure::failed(format!("{}:{number}: not a label of KITTI", path.display()));
-        let frame: u32 = words[0].parse().map_err(|_| wrong())?;
-        if frame >= MOST_FRAMES {
-            return Err(wrong());
-        }
-        let corners = words.get(BOX).ok_or_else(wrong)?;
+        let frame = words[0].parse::<u32>().ok().filter(|frame| *frame < MOST_FRAMES);
+        let (Some(frame), Some(corners)) = (frame, words.get(BOX)) else {
+            return Err(no_label(path, number));
+        };
         let &[left, top, right, bottom] = &numbers(corners.iter().copied(), path, number)?[..]
         else {
-            return Err(wrong());
+            return Err(no_label(path, number));
         };
         let width = right - left;
         let height = bottom - top;
@@ -115,6 +112,11 @@ fn boxes(path: &Path) -> Result<String, Failure> {
         );
     }
     Ok(out)
+}
+
+/// The failure on a line that is no label.
+fn no_label(path: &Path, line: usize) -> Failure {
+    Failure::failed(format!("{}:{line}: not a label of KITTI", path.display()))
 }
 
 /// Radius of the earth as KITTI's own tools take it, m.

@@ -95,12 +95,14 @@ fn info(
 
 /// Reads the bytes of an image, and decodes it to its end.
 fn whole_image(file: &Path) -> Result<(Vec<u8>, DynamicImage), Failure> {
-    let unusable = |why: &dyn std::fmt::Display| {
-        Failure::failed(format!("cannot use {}: {why}", file.display()))
-    };
-    let data = read_bytes(file, FileLimit::Image).map_err(|error| unusable(&error))?;
-    let decoded = image::load_from_memory(&data).map_err(|error| unusable(&error))?;
+    let data = read_bytes(file, FileLimit::Image).map_err(|error| unusable_file(file, &error))?;
+    let decoded = image::load_from_memory(&data).map_err(|error| unusable_file(file, &error))?;
     Ok((data, decoded))
+}
+
+/// The failure on a file that is no image that can be read.
+fn unusable_file(file: &Path, why: &dyn std::fmt::Display) -> Failure {
+    Failure::failed(format!("cannot use {}: {why}", file.display()))
 }
 
 /// Writes a 16-bit PNG as millimetres.

@@ -84,9 +84,10 @@ mod tests {
     fn an_attachment_is_found_by_its_name() {
         let home = tempfile::tempdir().unwrap();
         let path = written(home.path(), &["other", "config.toml"]);
-        let read = |name| read_attachment(&path, name, &Limits::default()).unwrap();
-        assert_eq!(read("config.toml").unwrap(), b"text of config.toml");
-        assert_eq!(read("nothing"), None);
+        let [there, missing] = ["config.toml", "nothing"]
+            .map(|name| read_attachment(&path, name, &Limits::default()).unwrap());
+        assert_eq!(there.unwrap(), b"text of config.toml");
+        assert_eq!(missing, None);
     }
 
     #[test]

@@ -143,10 +143,10 @@ mod tests {
     #[test]
     fn a_lag_is_the_median_where_it_is_constant() {
         let recorded = at(&[0.0, 0.1, 0.2, 0.3, 0.4]);
-        let lag = |stamps: &[f64]| constant_lag_s(&at(stamps), &recorded);
-        assert!((lag(&[0.9, 1.0, 1.1, 1.2, 1.3]).unwrap() - 0.9).abs() < 1e-6);
-        assert_eq!(lag(&[0.9, 1.0, 1.1, 2.2, 2.3]), None);
-        assert_eq!(lag(&[0.9, 1.0]), None);
+        let lag_s = constant_lag_s(&at(&[0.9, 1.0, 1.1, 1.2, 1.3]), &recorded);
+        assert!((lag_s.unwrap() - 0.9).abs() < 1e-6);
+        assert_eq!(constant_lag_s(&at(&[0.9, 1.0, 1.1, 2.2, 2.3]), &recorded), None);
+        assert_eq!(constant_lag_s(&at(&[0.9, 1.0]), &recorded), None);
         let many = Times::of(&at(&[-1.5, -1.4, -1.0, -1.2, -1.1]), &recorded).unwrap();
         assert!((many.latest_lag_s().unwrap() + 1.2).abs() < 1e-6);
         let few = Times::of(&at(&[-1.5, -1.4]), &recorded).unwrap();

@@ -172,14 +172,14 @@ mod tests {
 
     #[test]
     fn topics_of_sensors_that_are_not_read_are_refused() {
-        let of = |name: &str| {
+        let [unknown, known] = ["sonar", "laser"].map(|name: &str| {
             let topics = [(name.to_owned(), "/sonar".to_owned())].into();
             InputSettings { topics, ..InputSettings::default() }.check()
-        };
-        let refusal = of("sonar").unwrap_err().to_string();
+        });
+        let refusal = unknown.unwrap_err().to_string();
         assert!(refusal.contains("`topics.sonar`: no sensor of that name"), "{refusal}");
         assert!(refusal.contains("laser_topic, detections_topic"), "{refusal}");
-        assert!(of("laser").is_err(), "it has a key of its own");
+        assert!(known.is_err(), "it has a key of its own");
         assert!(InputSettings::default().check().is_ok());
     }
 }

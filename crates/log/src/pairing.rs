@@ -322,10 +322,10 @@ mod tests {
         let mut waiting = Waiting::default();
         waiting.push(at(100));
         waiting.push(at(160));
-        let mut take = |t, next: u64| waiting.take(at(t).stamp, Some(at(next).stamp), 0.03);
-        assert_eq!(take(92, 125), Some(at(100)));
-        assert_eq!(take(125, 158), None);
-        assert_eq!(take(158, 191), Some(at(160)));
+        for (t, next, depth) in [(92, 125, Some(100)), (125, 158, None), (158, 191, Some(160))] {
+            let taken = waiting.take(at(t).stamp, Some(at(next).stamp), 0.03);
+            assert_eq!(taken, depth.map(at), "{t}");
+        }
         assert_eq!(waiting.unpaired, 0);
     }
 
@@ -351,13 +351,12 @@ mod tests {
     fn live_the_newest_complete_image_comes_at_once_and_older_ones_are_skipped() {
         let mut reorder = Reorder::new(2);
         let _ = [10, 20, 30].map(|t| reorder.push(at(t)));
-        let upto = |t| move |stamp: Stamp| millis(stamp) <= t;
-        let (popped, skipped) = reorder.pop_newest(upto(20));
+        let (popped, skipped) = reorder.pop_newest(|stamp| millis(stamp) <= 20);
         assert_eq!((popped.map(|(image, _)| millis(image.stamp)), skipped), (Some(20), 1));
-        assert_eq!(reorder.pop_newest(upto(20)), (None, 0));
+        assert_eq!(reorder.pop_newest(|stamp| millis(stamp) <= 20), (None, 0));
         assert_eq!(reorder.push(at(15)), Arrival::Suspect);
         let _ = [40, 50].map(|t| reorder.push(at(t)));
-        let (waited, skipped) = reorder.pop_newest(upto(20));
+        let (waited, skipped) = reorder.pop_newest(|stamp| millis(stamp) <= 20);
         assert_eq!((waited, skipped), (Some((at(30), Some(at(40).stamp))), 0));
     }
 

@@ -112,10 +112,10 @@ mod tests {
             let ray = camera.ray(Point2::new(x as f64, y as f64));
             let o = depth_from_camera.translation.vector;
             let d = depth_from_camera.rotation * ray;
-            let hit = |z: f64| (z - o.z) / d.z;
-            let at = o + d * hit(2.0);
+            let at = o + d * ((2.0 - o.z) / d.z);
             let on_board = at.x.abs() < 0.5 && at.y.abs() < 0.5;
-            hit(if on_board { 2.0 } else { 4.0 }) as f32
+            let hit_m = if on_board { 2.0 } else { 4.0 };
+            ((hit_m - o.z) / d.z) as f32
         })
     }
 

@@ -24,10 +24,9 @@ impl Timing {
     /// Computes the statistics; `None` if no stamp is later than the previous one.
     pub fn of(stamps: &[Stamp]) -> Option<Self> {
         let steps: Vec<f64> = stamps.windows(2).map(|w| w[1].seconds_since(w[0])).collect();
-        let ahead = || steps.iter().copied().filter(|step| *step > 0.0);
         Some(Self {
-            median_period_s: median(ahead())?,
-            longest_gap_s: ahead().fold(0.0, f64::max),
+            median_period_s: median(steps.iter().copied().filter(|step| *step > 0.0))?,
+            longest_gap_s: steps.iter().copied().fold(0.0, f64::max),
             steps_back: steps.iter().filter(|step| **step < 0.0).count(),
             // Adding 0 turns a negative zero into a positive one.
             longest_step_back_s: -steps.iter().copied().fold(0.0, f64::min) + 0.0,

@@ -121,17 +121,21 @@ pub fn read_truth(path: &Path, limits: &Limits) -> Result<Option<Vec<TruthFrame>
 /// # Errors
 /// A file that cannot be read, or a line that is no [`TruthFrame`].
 pub fn read_truth_lines(path: &Path) -> Result<Vec<TruthFrame>, LogError> {
-    let wrong = |number, why| LogError::Truth { path: path.to_owned(), number, why };
     let mut text = String::new();
     let read = open_file(path)?.read_to_string(&mut text);
-    read.map_err(|error| wrong(1, error.to_string()))?;
-    let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
-    let frames = lines.map(|(at, line)| {
-        serde_json::from_str(line).map_err(|error| wrong(at + 1, error.to_string()))
-    });
-    let mut frames = frames.collect::<Result<Vec<TruthFrame>, LogError>>()?;
+    read.map_err(|error| wrong_line(path, 1, &error))?;
+    let mut frames: Vec<TruthFrame> = Vec::new();
+    for (at, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
+        let frame = serde_json::from_str(line);
+        frames.push(frame.map_err(|error| wrong_line(path, at + 1, &error))?);
+    }
     frames.sort_by_key(|frame| frame.stamp_ns);
     Ok(frames)
+}
+
+/// The error on a line of a truth file, counted from 1.
+fn wrong_line(path: &Path, number: usize, why: &dyn std::fmt::Display) -> LogError {
+    LogError::Truth { path: path.to_owned(), number, why: why.to_string() }
 }
 
 fn parse(data: &[u8], plain: bool) -> Result<TruthFrame, String> {

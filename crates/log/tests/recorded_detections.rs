@@ -82,13 +82,13 @@ fn detections_that_the_settings_name_are_listed_as_usable() {
     log.message(TOPIC, stamp(0), &array(stamp(0), &["person"]));
     log.colour(stamp(0));
     let saved = log.save();
-    let usable = |detections_topic: Option<&str>| {
-        let detections_topic = detections_topic.map(str::to_owned);
+    let [named, unnamed] = [Some(TOPIC), None].map(|topic| {
+        let detections_topic = topic.map(str::to_owned);
         let input = InputSettings { detections_topic, ..InputSettings::default() };
         tagalong_log::inspect(&saved.path, &input, &Default::default()).unwrap().usable
-    };
-    assert_eq!(usable(Some(TOPIC)), ["colour", "detections"]);
-    assert_eq!(usable(None), ["colour"]);
+    });
+    assert_eq!(named, ["colour", "detections"]);
+    assert_eq!(unnamed, ["colour"]);
 }
 
 #[test]

@@ -414,9 +414,12 @@ fn too_near(
     limiter: &CommandLimiterSettings,
 ) -> Option<String> {
     let stopping_m = limiter.stopping_m(robot.max_speed_mps);
+    let distance_m = stand_off_m?;
     // Written as `>=` so that a distance that is not a number counts as too near.
-    let stops = |distance: f64| distance >= stopping_m;
-    let distance_m = stand_off_m.filter(|distance| !stops(*distance))?;
+    let stops = distance_m >= stopping_m;
+    if stops {
+        return None;
+    }
     Some(format!(
         "a robot at {} m/s needs {stopping_m:.2} m to stop, and follows at {distance_m} m: raise \
          `stand_off_m` or lower `max_speed_mps` in [robot]",

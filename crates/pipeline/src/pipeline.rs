@@ -217,20 +217,16 @@ impl Pipeline {
             self.settings.seed,
             resolved.get("robot")
         );
-        let identity = |kind: &str, at: usize| {
-            let section = resolved.get(kind).and_then(|sections| sections.get(at));
-            let part = |name: &str| section.and_then(|section| section.get(name));
-            format!("{kind} {at} {around} {:?} {:?}", part("plugin"), part("config"))
-        };
         let slots = self.tracker.detectors().iter().enumerate();
         let detectors = slots.map(|(at, slot)| {
             let forgets = !slot.plugin.plugin().remembers();
             // An answer of a detector with memory depends on earlier frames, so it is not shared.
-            forgets.then(|| identity("detectors", at))
+            forgets.then(|| identity_of(resolved, "detectors", at, &around))
         });
         let detectors = detectors.collect();
-        let verifiers =
-            (0..self.tracker.verifier_count()).map(|at| identity("verifiers", at)).collect();
+        let verifiers = (0..self.tracker.verifier_count())
+            .map(|at| identity_of(resolved, "verifiers", at, &around))
+            .collect();
         self.tracker.share_answers(Identities { detectors, verifiers });
     }
 
@@ -283,4 +279,12 @@ impl Pipeline {
         report.obstacles = obstacles;
         Ok(())
     }
+}
+
+/// All that the answers of a plugin follow from, apart from the frames.
+fn identity_of(resolved: &toml::Table, kind: &str, at: usize, around: &str) -> String {
+    let section = resolved.get(kind).and_then(|sections| sections.get(at));
+    let plugin = section.and_then(|section| section.get("plugin"));
+    let config = section.and_then(|section| section.get("config"));
+    format!("{kind} {at} {around} {plugin:?} {config:?}")
 }

@@ -28,39 +28,40 @@ impl Animation {
     /// # Errors
     /// A sentence that names the file: a picture that cannot be read, a disk that is full.
     pub fn write<P: AsRef<Path>>(&self, pictures: &[P], to: &Path) -> Result<(), String> {
-        let cannot =
-            |error: &dyn std::fmt::Display| format!("cannot write {}: {error}", to.display());
-        let file = BufWriter::new(File::create(to).map_err(|error| cannot(&error))?);
+        let file = BufWriter::new(File::create(to).map_err(|error| cannot_write(to, &error))?);
         let Some(first) = pictures.first() else { return Ok(()) };
         let mut shown = self.read(first.as_ref())?;
         let (columns, rows) = shown.dimensions();
-        let too_large = || cannot(&"a GIF has at most 65535 columns and rows");
-        let width = u16::try_from(columns).map_err(|_| too_large())?;
-        let height = u16::try_from(rows).map_err(|_| too_large())?;
-        let mut encoder = Encoder::new(file, width, height, &[]).map_err(|error| cannot(&error))?;
-        encoder.set_repeat(Repeat::Infinite).map_err(|error| cannot(&error))?;
+        let (Ok(width), Ok(height)) = (u16::try_from(columns), u16::try_from(rows)) else {
+            return Err(cannot_write(to, &"a GIF has at most 65535 columns and rows"));
+        };
+        let mut encoder =
+            Encoder::new(file, width, height, &[]).map_err(|error| cannot_write(to, &error))?;
+        encoder.set_repeat(Repeat::Infinite).map_err(|error| cannot_write(to, &error))?;
         for (at, path) in pictures.iter().enumerate() {
             let mut part = match at {
                 0 => shown.clone(),
                 _ => changed(&mut shown, self.read(path.as_ref())?),
             };
             if part.dimensions() != (columns, rows) {
-                return Err(cannot(&format!("{} has another size", path.as_ref().display())));
+                let why = format!("{} has another size", path.as_ref().display());
+                return Err(cannot_write(to, &why));
             }
             let mut frame = Frame::from_rgba_speed(width, height, &mut part, QUANTISING_SPEED);
             frame.delay = u16::try_from(self.delay_ms / 10).unwrap_or(u16::MAX);
             // Pixels that a later picture leaves transparent stay as they are.
             frame.dispose = DisposalMethod::Keep;
-            encoder.write_frame(&frame).map_err(|error| cannot(&error))?;
+            encoder.write_frame(&frame).map_err(|error| cannot_write(to, &error))?;
         }
         Ok(())
     }
 
     fn read(&self, path: &Path) -> Result<RgbaImage, String> {
-        let cannot =
-            |error: &dyn std::fmt::Display| format!("cannot read {}: {error}", path.display());
-        let reader = ImageReader::open(path).map_err(|error| cannot(&error))?;
-        let whole = reader.decode().map_err(|error| cannot(&error))?.into_rgba8();
+        let reader = ImageReader::open(path).map_err(image::ImageError::from);
+        let whole = reader
+            .and_then(ImageReader::decode)
+            .map_err(|error| format!("cannot read {}: {error}", path.display()))?
+            .into_rgba8();
         if whole.width() <= self.width {
             return Ok(whole);
         }
@@ -68,6 +69,11 @@ impl Animation {
         let height = u32::try_from(height).unwrap_or(u32::MAX).max(1);
         Ok(resize(&whole, self.width, height, FilterType::Triangle))
     }
+}
+
+/// The message on an animation that cannot be written.
+fn cannot_write(to: &Path, why: &dyn std::fmt::Display) -> String {
+    format!("cannot write {}: {why}", to.display())
 }
 
 /// Returns a picture with the pixels left transparent that are shown already, and notes what is

@@ -242,9 +242,9 @@ impl Canvas {
 
     fn letter(&mut self, x: i64, y: i64, letter: char, lettering: Lettering, ink: Ink) {
         let (weight, height) = lettering.raster();
-        let glyph = |letter| get_raster(letter, weight, height);
         // The font is built with ASCII only.
-        let Some(glyph) = glyph(letter).or_else(|| glyph('?')) else { return };
+        let glyph = get_raster(letter, weight, height).or_else(|| get_raster('?', weight, height));
+        let Some(glyph) = glyph else { return };
         for (dy, row) in (0..).zip(glyph.rows()) {
             for (dx, cover) in (0..).zip(row).filter(|(_, cover)| **cover > 0) {
                 self.dot(x + dx, y + dy, ink.faint(ink.opacity * f32::from(*cover) / 255.0));

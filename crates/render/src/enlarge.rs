@@ -22,14 +22,13 @@ pub fn enlarge(image: &RgbImage, by: usize) -> RgbImage {
         let down = tap(y, by, image.height());
         let upper = image.row(down.first);
         let lower = image.row(down.second);
-        let mixed = |c: usize| {
+        std::array::from_fn(|c| {
             let upper = across.mix(upper[across.first][c], upper[across.second][c]);
             let lower = across.mix(lower[across.first][c], lower[across.second][c]);
             let sum = upper * (2 * by - down.share) + lower * down.share;
             // Rounded; `share` counts in parts of twice the factor.
             ((sum + 2 * by * by) / (4 * by * by)) as u8
-        };
-        [mixed(0), mixed(1), mixed(2)]
+        })
     })
 }
 

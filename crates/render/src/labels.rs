@@ -55,12 +55,18 @@ impl Labels {
 
     /// Returns a free place at the box: above, below, inside, at its sides.
     fn beside(&self, of: &Rect, size: [f64; 2]) -> Option<Rect> {
-        let places = || places_at(of, size).into_iter().map(|place| self.shifted_inside(place));
-        let spares =
-            |place: &Rect| self.spared.iter().all(|spared| spared == of || !overlap(spared, place));
-        let is_near = |place: &Rect| distance_px(place, of) <= NEAR_PX;
-        let free = |place: &Rect| is_near(place) && self.is_free(place);
-        places().find(|place| free(place) && spares(place)).or_else(|| places().find(free))
+        let mut second_best = None;
+        for place in places_at(of, size) {
+            let place = self.shifted_inside(place);
+            if distance_px(&place, of) > NEAR_PX || !self.is_free(&place) {
+                continue;
+            }
+            if self.spared.iter().all(|spared| spared == of || !overlap(spared, &place)) {
+                return Some(place);
+            }
+            second_best = second_best.or(Some(place));
+        }
+        second_best
     }
 
     /// Returns the free place nearest to the box, on a grid of lines and half lines.

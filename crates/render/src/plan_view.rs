@@ -90,9 +90,8 @@ pub fn draw(scene: &OverlayData, trails: &Trails, style: OverlayStyle, height: u
         let points: Vec<_> = trail.iter().map(|p| plan.of(p)).collect();
         canvas.thick_path(&points, colour_of(id).faint(0.7));
     }
-    let is_target = |track: &Track| scene.report.target == Some(track.id);
     for track in style.tracks(scene).rev() {
-        draw_track(&mut canvas, &plan, track, is_target(track));
+        draw_track(&mut canvas, &plan, track, scene.report.target == Some(track.id));
         if style.is_debug() {
             draw_uncertainty(&mut canvas, &plan, track);
         }

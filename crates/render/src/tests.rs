@@ -55,11 +55,12 @@ fn the_state_of_the_filter_shows_in_the_image() {
         maps: vec![SketchMap { title: String::new(), columns: 10, values: vec![0.5; 50] }],
     }));
     let with = picture(&scene, &Trails::default(), DEBUG);
-    let changed = |columns| changed(&without, &with, columns, 0..480);
-    assert_eq!(changed(200..260), 4 * 60, "a run, twice as large in both directions");
-    assert!(changed(390..412) > 4, "a particle");
+    let [run, particle, map] =
+        [200..260, 390..412, 0..80].map(|columns| changed(&without, &with, columns, 0..480));
+    assert_eq!(run, 4 * 60, "a run, twice as large in both directions");
+    assert!(particle > 4, "a particle");
     let title = 2 * LINE_PX as usize;
-    assert_eq!(changed(0..80), 40 * 20 + title, "a map, and its title's bar");
+    assert_eq!(map, 40 * 20 + title, "a map, and its title's bar");
 }
 
 #[test]
@@ -102,10 +103,8 @@ fn points_of_a_scan_are_in_the_plan() {
 
     let empty = scene(&[], Vec::new());
     let scanned = OverlayData { scan: vec![Point2::new(3.0, 1.0)], ..scene(&[], Vec::new()) };
-    let plan =
-        |scene: &OverlayData| plan_view::draw(scene, &Trails::default(), DEBUG, 450).into_image();
-    let without = plan(&empty);
-    let with = plan(&scanned);
+    let [without, with] = [empty, scanned]
+        .map(|scene| plan_view::draw(&scene, &Trails::default(), DEBUG, 450).into_image());
     let changed: Vec<usize> =
         (0..without.pixels().len()).filter(|k| without.pixels()[*k] != with.pixels()[*k]).collect();
     assert!(!changed.is_empty() && changed.iter().all(at), "{changed:?}");
@@ -172,15 +171,14 @@ fn the_ids_of_two_people_at_one_place_can_both_be_read_in_the_plan() {
 fn a_predicted_person_is_a_ring_in_the_plan() {
     let mut scene = scene(&[1], Vec::new());
     scene.report.tracks[0].estimate.person.velocity = Vector2::zeros();
-    let middle = |scene: &OverlayData| {
-        let plan = plan_view::draw(scene, &Trails::default(), CALM, 480).into_image();
+    let [predicted, seen] = [false, true].map(|seen| {
+        scene.report.tracks[0].seen = seen;
+        let plan = plan_view::draw(&scene, &Trails::default(), CALM, 480).into_image();
         // The person is 3 m ahead and 0.4 m to the left; 480 rows show 9 m.
         plan.get(192 - 21, 427 - 160)
-    };
-    let seen = middle(&scene);
-    scene.report.tracks[0].seen = false;
-    assert_ne!(middle(&scene), seen);
-    assert_eq!(middle(&scene), Some([24, 24, 28]));
+    });
+    assert_ne!(predicted, seen);
+    assert_eq!(predicted, Some([24, 24, 28]));
 }
 
 #[test]

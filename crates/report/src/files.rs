@@ -93,9 +93,10 @@ fn row(task: &TaskResult, names: &BTreeSet<String>) -> Vec<String> {
         Outcome::Failed { why } => ("failed", why.as_str()),
         Outcome::Skipped { why } => ("skipped", why.as_str()),
     };
-    let nis = |of: fn(&tagalong_eval::Consistency) -> String| {
-        task.nis.as_ref().map_or_else(String::new, of)
-    };
+    let nis = task.nis.as_ref().map(|nis| {
+        [nis.mean.to_string(), nis.lower.to_string(), nis.upper.to_string(), nis.count.to_string()]
+    });
+    let [mean, lower, upper, count] = nis.unwrap_or_default();
     let mut cells = vec![
         task.pipeline.clone(),
         task.log.clone(),
@@ -106,10 +107,10 @@ fn row(task: &TaskResult, names: &BTreeSet<String>) -> Vec<String> {
         task.frames.to_string(),
         task.duration_s.to_string(),
         task.data_lost.to_string(),
-        nis(|n| n.mean.to_string()),
-        nis(|n| n.lower.to_string()),
-        nis(|n| n.upper.to_string()),
-        nis(|n| n.count.to_string()),
+        mean,
+        lower,
+        upper,
+        count,
         task.funnel.iter().map(|d| d.count).sum::<u64>().to_string(),
         task.events.len().to_string(),
     ];

@@ -136,7 +136,6 @@ pub fn per_log<'a>(
 }
 
 fn pipeline(view: &OrderedBenchmark<'_>, name: &str) -> PipelineSummary {
-    let count = |is: fn(&Outcome) -> bool| view.of(name).filter(|t| is(&t.outcome)).count() as u64;
     let mut figures = BTreeMap::new();
     for place in ComparisonSpace::ALL {
         for figure in Figure::at(place) {
@@ -146,12 +145,22 @@ fn pipeline(view: &OrderedBenchmark<'_>, name: &str) -> PipelineSummary {
             }
         }
     }
+    let mut done = 0;
+    let mut failed = 0;
+    let mut skipped = 0;
+    for task in view.of(name) {
+        match task.outcome {
+            Outcome::Done => done += 1,
+            Outcome::Failed { .. } => failed += 1,
+            Outcome::Skipped { .. } => skipped += 1,
+        }
+    }
     let people = people(view, name);
     PipelineSummary {
         pipeline: name.to_owned(),
-        done: count(|o| *o == Outcome::Done),
-        failed: count(|o| matches!(o, Outcome::Failed { .. })),
-        skipped: count(|o| matches!(o, Outcome::Skipped { .. })),
+        done,
+        failed,
+        skipped,
         figures,
         people: people.iter().map(|[_, all]| all).sum(),
         people_found: clustered_share(&people),

@@ -168,20 +168,15 @@ fn every_anchor_leads_somewhere_and_ids_are_unique() {
     let mut benchmark = two_by_three();
     common::spoil(&mut benchmark, Outcome::Failed { why: "x".into() });
     let page = html(&benchmark, Some(&common::timings(&benchmark)));
-    let of = |start: &str| -> Vec<String> {
-        page.split(start)
-            .skip(1)
-            .filter_map(|rest| rest.split('"').next())
-            .map(str::to_owned)
-            .collect()
-    };
-    let ids = of(" id=\"");
+    let [ids, anchors] = [" id=\"", "href=\"#"].map(|start| -> Vec<&str> {
+        page.split(start).skip(1).filter_map(|rest| rest.split('"').next()).collect()
+    });
     let mut unique = ids.clone();
     unique.sort();
     unique.dedup();
     assert_eq!(unique.len(), ids.len());
-    assert!(of("href=\"#").iter().all(|anchor| ids.contains(anchor)));
-    assert!(of("href=\"#").len() > 8);
+    assert!(anchors.iter().all(|anchor| ids.contains(anchor)));
+    assert!(anchors.len() > 8);
 }
 
 #[test]
@@ -231,15 +226,15 @@ fn means_are_over_logs_and_the_best_needs_all_of_them() {
         vec![("a", "x", 0.5), ("a", "y", 0.6), ("b", "x", 0.6), ("b", "y", 0.8), ("c", "x", 0.9)];
     values.push(("a", "y", 0.8));
     let summary = Summary::new(&with_hota(&values));
-    let hota = |name: &str| summary.pipeline(name).unwrap().figures["image.HOTA"];
-    assert!((hota("a").mean - 0.6).abs() < 1e-12, "two runs of y are one log");
-    let [low, high] = hota("a").interval.unwrap();
+    let [a, b, c] =
+        ["a", "b", "c"].map(|name| summary.pipeline(name).unwrap().figures["image.HOTA"]);
+    assert!((a.mean - 0.6).abs() < 1e-12, "two runs of y are one log");
+    let [low, high] = a.interval.unwrap();
     assert_eq!([low, high], [0.0, 1.0], "two logs, and no rate beyond its range");
-    assert_eq!((hota("a").best, hota("b").best, hota("c").best), (false, true, false));
-    assert_eq!((hota("c").logs, hota("c").interval), (1, None));
-    let pair = |a: &str, b: &str| pair_of(&summary, a, b);
-    let two = pair("a", "b");
-    let one = pair("a", "c");
+    assert_eq!((a.best, b.best, c.best), (false, true, false));
+    assert_eq!((c.logs, c.interval), (1, None));
+    let two = pair_of(&summary, "a", "b");
+    let one = pair_of(&summary, "a", "c");
     assert!((two.difference - 0.1).abs() < 1e-12);
     assert_eq!((two.logs, two.interval, two.p_value, two.is_clear()), (2, None, 0.5, false));
     assert_eq!((one.logs, one.interval, one.p_value, one.is_clear()), (1, None, 1.0, false));
@@ -424,9 +419,10 @@ fn each_pair_says_in_one_line_why() {
     let line = &line[..line.find('<').unwrap()];
     assert!(line.contains(" people, ") && line.contains(" misses of "), "{line}");
     let line = line.replace("&quot;", "\"");
-    let dropped_by =
-        |test: &str| line.contains(&format!(" the test \"{test}\" dropped the candidate"));
-    assert!(dropped_by("margin") || dropped_by("size"), "{line}");
+    let mut reasons = ["margin", "size"]
+        .map(|test| format!(" the test \"{test}\" dropped the candidate"))
+        .into_iter();
+    assert!(reasons.any(|reason| line.contains(&reason)), "{line}");
 }
 
 #[test]

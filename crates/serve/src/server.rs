@@ -177,8 +177,11 @@ impl Guard {
         let is_change = request.method == "POST";
         let needs_origin = is_change && self.changes != Changes::FromPrograms;
         // Where a browser speaks, the page must be the one of this very address.
-        let is_same = |origin: &str| origin.strip_prefix("http://") == Some(host);
-        if request.header("origin").map_or(needs_origin, |origin| !is_same(origin)) {
+        let is_foreign = match request.header("origin") {
+            Some(origin) => origin.strip_prefix("http://") != Some(host),
+            None => needs_origin,
+        };
+        if is_foreign {
             return refuse("the request comes from another page");
         }
         let Some(path) = self.behind_key(&request.path) else {

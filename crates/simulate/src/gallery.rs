@@ -130,9 +130,10 @@ fn annotated(image: &RgbImage, truth: &[Truth]) -> RgbImage {
 
 /// Draws the bones between joints in the image: those in sight bright, the others faint.
 fn skeleton(canvas: &mut Canvas, joints: &[Joint]) {
-    let find = |name: &str| joints.iter().find(|joint| joint.name == name);
     for [from, to] in BONES {
-        let Some((from, to)) = find(from).zip(find(to)) else { continue };
+        let from = joints.iter().find(|joint| joint.name == from);
+        let to = joints.iter().find(|joint| joint.name == to);
+        let Some((from, to)) = from.zip(to) else { continue };
         let Some((a, b)) = from.pixel.zip(to.pixel) else { continue };
         // Across the seam of a panorama a bone would cross the whole image.
         if (a.x - b.x).abs() > 0.5 * canvas.width() as f64 {
@@ -152,13 +153,10 @@ fn outline(canvas: &mut Canvas, rect: &Rect, width: f64, ink: Ink) {
 }
 
 fn side_by_side(images: &Images) -> (RgbImage, RgbImage) {
-    let grey = |image: &tagalong_core::GreyImage| image.map(|v| [v; 3]);
-    let first = images.colour.as_deref().cloned().or(images.grey.as_deref().map(grey));
-    let second = images
-        .depth
-        .as_deref()
-        .map(shades)
-        .or(images.right.as_deref().map(|right| grey(&right.image)));
+    let grey = images.grey.as_deref().map(|image| image.map(|v| [v; 3]));
+    let first = images.colour.as_deref().cloned().or(grey);
+    let right = images.right.as_deref().map(|right| right.image.map(|v| [v; 3]));
+    let second = images.depth.as_deref().map(shades).or(right);
     (first.unwrap_or_default(), second.unwrap_or_default())
 }
 

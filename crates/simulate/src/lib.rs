@@ -243,9 +243,10 @@ mod tests {
     /// Frames of a log whose first stamp is the start of the scene, from 1 s to 2 s.
     fn within(frames: &[LogFrame]) -> &[LogFrame] {
         let start = frames[0].frame.stamp;
-        let seconds = |frame: &LogFrame| frame.frame.stamp.seconds_since(start);
-        let first = frames.iter().position(|frame| seconds(frame) > 0.99).unwrap();
-        let end = frames.iter().position(|frame| seconds(frame) > 1.99).unwrap();
+        let [first, end] = [0.99, 1.99].map(|seconds| {
+            let mut elapsed_s = frames.iter().map(|one| one.frame.stamp.seconds_since(start));
+            elapsed_s.position(|elapsed_s| elapsed_s > seconds).expect("frames of two seconds")
+        });
         &frames[first..end]
     }
 

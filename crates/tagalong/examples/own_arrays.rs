@@ -35,11 +35,10 @@ fn depth_image() -> DepthImage {
         let below_px = row as f64 - 239.5;
         let across_m = (column as f64 - 319.5) / scale;
         let below_m = below_px / scale + 0.4;
-        let is_part = |[centre, half_width, half_height]: &[f64; 3]| {
-            (across_m / half_width).hypot((below_m - centre) / half_height) < 1.0
-        };
-        if PARTS.iter().any(is_part) {
-            return 2.5;
+        for [centre, half_width, half_height] in PARTS {
+            if (across_m / half_width).hypot((below_m - centre) / half_height) < 1.0 {
+                return 2.5;
+            }
         }
         let floor_m = 1.2 * 525.0 / below_px;
         if below_px > 0.0 { floor_m.min(5.0) as f32 } else { 5.0 }

@@ -71,24 +71,23 @@ fn a_log_gives_the_same_tracks_each_time() {
 
 #[test]
 fn the_input_of_the_config_reaches_the_reader() {
-    fn config(line: &str) -> String {
-        format!("extends = \"depth-ekf.toml\"\n[input]\n{line}\n")
-    }
+    assert!(frames_with("").unwrap() > 20);
+    let shown = frames_with("depth_topic = \"/none\"").unwrap_err().to_string();
+    assert!(shown.contains("/none") && shown.contains("present:"), "{shown}");
+    let shown = frames_with("depth_topik = \"/none\"").unwrap_err().to_string();
+    assert!(shown.contains("config.toml:3:1: ") && shown.contains("`depth_topic`"), "{shown}");
+    let of_wrong_kind = "depth_topic = \"/camera/color/camera_info\"";
+    let shown = frames_with(of_wrong_kind).unwrap_err().to_string();
+    assert!(shown.contains("config.toml:3:15: "), "the line of a topic of a wrong kind: {shown}");
+}
 
+/// The number of frames with this line in the `[input]` of the config.
+fn frames_with(line: &str) -> Result<usize> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../pipeline/configs");
     let registry = builtin_registry();
-    let frames = |line: &str| {
-        let builder = Pipeline::builder(&registry).folder(&folder);
-        let pipeline = builder.from_toml(&config(line))?;
-        Log::open(people())?.frames(&pipeline).map(|frames| frames.count())
-    };
-    assert!(frames("").unwrap() > 20);
-    let shown = frames("depth_topic = \"/none\"").unwrap_err().to_string();
-    assert!(shown.contains("/none") && shown.contains("present:"), "{shown}");
-    let shown = frames("depth_topik = \"/none\"").unwrap_err().to_string();
-    assert!(shown.contains("config.toml:3:1: ") && shown.contains("`depth_topic`"), "{shown}");
-    let shown = frames("depth_topic = \"/camera/color/camera_info\"").unwrap_err().to_string();
-    assert!(shown.contains("config.toml:3:15: "), "the line of a topic of a wrong kind: {shown}");
+    let config = format!("extends = \"depth-ekf.toml\"\n[input]\n{line}\n");
+    let pipeline = Pipeline::builder(&registry).folder(&folder).from_toml(&config)?;
+    Log::open(people())?.frames(&pipeline).map(|frames| frames.count())
 }
 
 #[test]

@@ -304,8 +304,9 @@ mod tests {
         };
         let estimate =
             tagalong_core::Estimate::new(person, nalgebra::SMatrix::identity(), Rect::default());
-        let track = |id: &u32| Track::new(TrackId(*id), estimate.clone(), 1.0).with_seen(false);
-        ids.iter().map(track).collect()
+        ids.iter()
+            .map(|id| Track::new(TrackId(*id), estimate.clone(), 1.0).with_seen(false))
+            .collect()
     }
 
     #[test]

@@ -67,9 +67,10 @@ mod tests {
     #[test]
     fn who_is_half_hidden_may_stand_aside_and_not_nearer() {
         let settings = OcclusionSettings { body_width_m: 0.5, ..OcclusionSettings::default() };
-        let of = |part| lateral_covariance(part, &Point3::new(3.0, 0.0, 1.6), &camera(), &settings);
-        assert_eq!(of(1.0), Matrix3::zeros());
-        let off = of(0.4);
+        let [none, off] = [1.0, 0.4].map(|part| {
+            lateral_covariance(part, &Point3::new(3.0, 0.0, 1.6), &camera(), &settings)
+        });
+        assert_eq!(none, Matrix3::zeros());
         assert!((off[(1, 1)].sqrt() - 0.15).abs() < 1e-12, "{off}");
         assert_eq!((off[(0, 0)], off[(2, 2)]), (0.0, 0.0));
         let left = lateral_covariance(0.4, &Point3::new(0.0, 3.0, 1.6), &camera(), &settings);

@@ -126,12 +126,14 @@ mod tests {
     #[test]
     fn the_same_verifier_judges_the_same_candidate_once_a_frame() {
         let frame = frame();
-        let judge = |identity: &str, candidate: f64, would_say: f64| {
-            log_odds(identity, &frame, &person(candidate), || Ok(would_say)).unwrap()
-        };
-        assert_eq!(judge("one", 1.0, -0.25), -0.25);
-        assert_eq!(judge("one", 1.0, 0.5), -0.25);
-        assert_eq!(judge("one", 2.0, 0.75), 0.75);
-        assert_eq!(judge("other", 1.0, 1.25), 1.25);
+        for (identity, candidate, would_say, says) in [
+            ("one", 1.0, -0.25, -0.25),
+            ("one", 1.0, 0.5, -0.25),
+            ("one", 2.0, 0.75, 0.75),
+            ("other", 1.0, 1.25, 1.25),
+        ] {
+            let said = log_odds(identity, &frame, &person(candidate), || Ok(would_say));
+            assert_eq!(said.unwrap(), says, "{identity} {candidate} {would_say}");
+        }
     }
 }

@@ -125,11 +125,10 @@ fn shown(
     settings: &OcclusionSettings,
 ) -> Shown {
     let range = range_m(position, camera);
-    let is_nearer = |c: &Occluder| {
+    let nearer = occluders.iter().filter(|c| {
         range - c.range_m > settings.min_gap_m.max(settings.min_gap_sigmas * c.sigma_m)
-    };
-    let in_front: Vec<&Occluder> =
-        occluders.iter().filter(|c| is_nearer(c) && may_hide(&c.region, region, camera)).collect();
+    });
+    let in_front: Vec<&Occluder> = nearer.filter(|c| may_hide(&c.region, region, camera)).collect();
     let image = Rect::new(0.0, 0.0, camera.width as f64, camera.height as f64);
     // Most people are wholly in the image without another person before them; then no sample needs
     // a look.
@@ -147,13 +146,16 @@ fn count(region: &Rect, image: &Rect, in_front: &[&Occluder], camera: &Camera) -
     for point in silhouette(region) {
         all += 1;
         // A panorama continues beyond its edges.
-        let near = |x: f64| Point2::new(camera.column_near(point.x, x), point.y);
-        if image.contains(near(image.centre().x)) {
-            inside += 1;
-            visible += u32::from(
-                !in_front.iter().any(|c| is_on_body(&c.region, near(c.region.centre().x))),
-            );
+        let column = camera.column_near(point.x, image.centre().x);
+        if !image.contains(Point2::new(column, point.y)) {
+            continue;
         }
+        inside += 1;
+        let is_hidden = in_front.iter().any(|c| {
+            let column = camera.column_near(point.x, c.region.centre().x);
+            is_on_body(&c.region, Point2::new(column, point.y))
+        });
+        visible += u32::from(!is_hidden);
     }
     Shown { all, inside, visible }
 }
@@ -294,17 +296,21 @@ mod tests {
         let near = Point3::new(2.0, 0.0, 1.6);
         let far = Point3::new(3.5, 0.0, 1.6);
         let camera = camera();
-        let cover = |sigma_m: f64| {
-            let covariance = Matrix3::identity() * (sigma_m * sigma_m);
-            Occluder::new(camera.upper_body(&near), &near, &covariance, &camera)
-        };
-        let seen = |cover| {
-            let region = camera.upper_body(&far);
-            visibility(&region, &far, &[cover], &camera, &OcclusionSettings::default())
-        };
-        assert_eq!(seen(cover(3.0)), Visibility::Visible);
-        assert_eq!(seen(cover(3.0).or(cover(0.1))), Visibility::Hidden);
-        assert_eq!(seen(cover(0.1).or(cover(3.0))), Visibility::Hidden, "its own range is told");
+        let region = camera.upper_body(&far);
+        // The last one tells its own range.
+        for (sigmas_m, seen) in [
+            (&[3.0_f64][..], Visibility::Visible),
+            (&[3.0, 0.1], Visibility::Hidden),
+            (&[0.1, 3.0], Visibility::Hidden),
+        ] {
+            let covers = sigmas_m.iter().map(|sigma_m| {
+                let covariance = Matrix3::identity() * (sigma_m * sigma_m);
+                Occluder::new(camera.upper_body(&near), &near, &covariance, &camera)
+            });
+            let cover = covers.reduce(Occluder::or).unwrap();
+            let settings = OcclusionSettings::default();
+            assert_eq!(visibility(&region, &far, &[cover], &camera, &settings), seen);
+        }
     }
 
     #[test]
@@ -325,21 +331,23 @@ mod tests {
             height: 120,
             robot_from_camera: ConicalMirror::upright(1.3),
         };
-        let seen = |near: Point3<f64>, far: Point3<f64>| {
-            let cover = Occluder::new(camera.upper_body(&near), &near, &Matrix3::zeros(), &camera);
-            let region = camera.upper_body(&far);
-            visibility(&region, &far, &[cover], &camera, &OcclusionSettings::default())
-        };
         let left = Point3::new(-2.0, 0.02, 1.5);
         let right = Point3::new(-4.0, -0.02, 1.5);
         let starts = [left, right].map(|head| camera.upper_body(&head));
         assert!(starts.iter().all(|region| region.right() > 480.0), "{starts:?}");
-        assert_eq!(seen(left, right), Visibility::Hidden);
-        assert_eq!(seen(left, Point3::new(4.0, 0.0, 1.5)), Visibility::Visible);
         // One starts left of the seam, the other right of it.
         let aside = Point3::new(-4.0, 0.5, 1.5);
         assert!(camera.upper_body(&aside).x < 40.0);
-        assert_eq!(seen(Point3::new(-2.0, 0.18, 1.5), aside), Visibility::Hidden);
+        for (near, far, seen) in [
+            (left, right, Visibility::Hidden),
+            (left, Point3::new(4.0, 0.0, 1.5), Visibility::Visible),
+            (Point3::new(-2.0, 0.18, 1.5), aside, Visibility::Hidden),
+        ] {
+            let cover = Occluder::new(camera.upper_body(&near), &near, &Matrix3::zeros(), &camera);
+            let region = camera.upper_body(&far);
+            let settings = OcclusionSettings::default();
+            assert_eq!(visibility(&region, &far, &[cover], &camera, &settings), seen, "{far}");
+        }
     }
 
     #[test]
@@ -353,17 +361,23 @@ mod tests {
     #[test]
     fn a_silhouette_is_a_head_on_shoulders_over_a_trunk() {
         let square = Rect::new(10.0, 20.0, 1.0, 1.0);
-        let on = |across: f64, down: f64| {
-            let both = [across, -across];
-            let hits = both.map(|x| is_on_body(&square, Point2::new(10.5 + x, 20.0 + down)));
-            assert_eq!(hits[0], hits[1], "left and right are the same");
-            hits[0]
-        };
-        assert!(!on(0.0, -0.1) && !on(0.0, 0.04) && on(0.0, 0.06), "air above the head");
-        assert!(on(0.16, 0.3) && !on(0.17, 0.3), "the head");
-        assert!(on(0.24, 0.6) && !on(0.26, 0.6), "shoulders fall away");
-        assert!(on(0.41, 0.9) && !on(0.43, 0.9) && on(0.41, 2.4), "the trunk");
-        assert!(!on(0.0, 2.6), "and there it ends");
+        for (across, down, is_on, part) in [
+            (0.0, -0.1, false, "air above the head"),
+            (0.0, 0.04, false, "air above the head"),
+            (0.0, 0.06, true, "the top of the head"),
+            (0.16, 0.3, true, "the head"),
+            (0.17, 0.3, false, "beside the head"),
+            (0.24, 0.6, true, "a shoulder"),
+            (0.26, 0.6, false, "shoulders fall away"),
+            (0.41, 0.9, true, "the trunk"),
+            (0.43, 0.9, false, "beside the trunk"),
+            (0.41, 2.4, true, "the end of the trunk"),
+            (0.0, 2.6, false, "below the trunk"),
+        ] {
+            for x in [10.5 + across, 10.5 - across] {
+                assert_eq!(is_on_body(&square, Point2::new(x, 20.0 + down)), is_on, "{part}");
+            }
+        }
     }
 
     /// Returns the visible part of a person 4 m ahead behind an occluder that begins at a column.
@@ -373,11 +387,11 @@ mod tests {
         let region = camera.upper_body(&far);
         let near = Point3::new(2.0, 0.0, 1.6);
         let screen = Rect::new(from_column, region.y - 900.0, 900.0, 900.0);
-        let cover = || Occluder::new(screen, &near, &Matrix3::zeros(), &camera);
+        let covers = [Occluder::new(screen, &near, &Matrix3::zeros(), &camera)];
         let settings = OcclusionSettings::default();
         (
-            part_shown(&region, &far, &[cover()], &camera, &settings),
-            visibility(&region, &far, &[cover()], &camera, &settings),
+            part_shown(&region, &far, &covers, &camera, &settings),
+            visibility(&region, &far, &covers, &camera, &settings),
         )
     }
 
@@ -386,15 +400,13 @@ mod tests {
         let camera = camera();
         let square = camera.upper_body(&Point3::new(4.0, 0.0, 1.6));
         // The silhouette of the occluder is its trunk: 0.42 of its width to both sides.
-        let edge = |part: f64| square.x + part * square.width - 0.08 * 900.0;
-        let (half, seen) = half_hidden(edge(0.5));
+        let [(half, seen), (little, hidden), (all, _), (none, _)] = [0.5, 0.4, 2.0, -0.2]
+            .map(|part| half_hidden(square.x + part * square.width - 0.08 * 900.0));
         assert!((half - 0.5).abs() < 0.05, "{half}");
         assert_eq!(seen, Visibility::Visible);
-        let (little, hidden) = half_hidden(edge(0.4));
         assert!((0.2..0.4).contains(&little), "{little}");
         assert_eq!(hidden, Visibility::Hidden);
-        assert_eq!(half_hidden(edge(2.0)).0, 1.0);
-        assert_eq!(half_hidden(edge(-0.2)).0, 0.0);
+        assert_eq!((all, none), (1.0, 0.0));
     }
 
     #[test]
@@ -407,13 +419,14 @@ mod tests {
         assert_eq!(part_shown(&region, &head, &[], &camera, &settings), 1.0);
         let gone = Rect::new(-500.0, 0.0, 100.0, 100.0);
         assert_eq!(part_shown(&gone, &head, &[], &camera, &settings), 1.0);
-        let seen = |x: f64| {
+        for (x, seen) in [
+            (-0.5 * region.width, Visibility::Visible),
+            (-0.7 * region.width, Visibility::Outside),
+            (640.0 - 0.3 * region.width, Visibility::Outside),
+        ] {
             let region = Rect { x, ..region };
-            visibility(&region, &head, &[], &camera, &settings)
-        };
-        assert_eq!(seen(-0.5 * region.width), Visibility::Visible);
-        assert_eq!(seen(-0.7 * region.width), Visibility::Outside);
-        assert_eq!(seen(640.0 - 0.3 * region.width), Visibility::Outside);
+            assert_eq!(visibility(&region, &head, &[], &camera, &settings), seen, "{x}");
+        }
     }
 
     #[test]
@@ -432,12 +445,14 @@ mod tests {
         let camera = camera();
         let settings = OcclusionSettings::default();
         let head = Point3::new(3.0, 0.0, 1.6);
-        let seen = |width: f64, height: f64| {
+        for (width, height, seen) in [
+            (50.0, 50.0, Visibility::Visible),
+            (0.0, 50.0, Visibility::Outside),
+            (50.0, 0.0, Visibility::Outside),
+        ] {
             let region = Rect::new(300.0, 100.0, width, height);
-            visibility(&region, &head, &[], &camera, &settings)
-        };
-        assert_eq!(seen(50.0, 50.0), Visibility::Visible);
-        assert_eq!([seen(0.0, 50.0), seen(50.0, 0.0)], [Visibility::Outside; 2]);
+            assert_eq!(visibility(&region, &head, &[], &camera, &settings), seen);
+        }
     }
 
     #[test]

@@ -107,8 +107,11 @@ impl TrackTable {
     ) -> Vec<Track> {
         let mut tracks: Vec<Track> =
             estimates.into_iter().filter_map(|(id, estimate)| self.track(id, estimate)).collect();
-        let range = |track: &Track| range_m(&track.estimate.person.position, camera);
-        tracks.sort_by(|a, b| range(a).total_cmp(&range(b)).then(a.id.cmp(&b.id)));
+        tracks.sort_by(|a, b| {
+            let a_m = range_m(&a.estimate.person.position, camera);
+            let b_m = range_m(&b.estimate.person.position, camera);
+            a_m.total_cmp(&b_m).then(a.id.cmp(&b.id))
+        });
         tracks
     }
 

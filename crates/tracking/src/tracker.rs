@@ -303,18 +303,22 @@ impl Tracker {
             if seen != Visibility::Visible {
                 continue;
             }
-            let failed_test = |found: &PendingDetection| {
-                if !gate.admits(track, &found.detection) {
-                    return Ok(Some(found.score_test(gate.start_log_odds)));
-                }
-                let fits = associator.ask(frame.index, |associator| {
-                    associator.fits(track, &found.detection, gate)
-                })?;
-                Ok((!fits).then_some("gate"))
-            };
             let funnel = &mut log.funnel;
-            let (found, dropped) =
-                self.search.find_track(frame, &detectors, track, failed_test, funnel)?;
+            let (found, dropped) = self.search.find_track(
+                frame,
+                &detectors,
+                track,
+                |found| {
+                    if !gate.admits(track, &found.detection) {
+                        return Ok(Some(found.score_test(gate.start_log_odds)));
+                    }
+                    let fits = associator.ask(frame.index, |associator| {
+                        associator.fits(track, &found.detection, gate)
+                    })?;
+                    Ok((!fits).then_some("gate"))
+                },
+                funnel,
+            )?;
             detections.add(dropped);
             let Some(found) = found else { continue };
             occluders.push(occluder_of_detection(&found.detection, &track.estimate, frame));

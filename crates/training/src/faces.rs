@@ -51,8 +51,7 @@ pub fn visit(data: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> 
 pub fn fddb(data: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
     let table = data.join("faces/fddb.csv");
     let folder = data.join("faces/fddb");
-    let wrong = |why: String| Failure::failed(format!("{}: {why}", table.display()));
-    let text = read_text(&table, FileLimit::Table).map_err(|error| wrong(error.to_string()))?;
+    let text = read_text(&table, FileLimit::Table).map_err(|error| wrong_file(&table, &error))?;
     let mut lines = text.lines();
     let names: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
     let columns = ["file", "major_r", "minor_r", "cx", "cy"]
@@ -64,7 +63,7 @@ pub fn fddb(data: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
         let numbers =
             [major, minor, x, y].map(|word| word.and_then(|word| word.parse::<f64>().ok()));
         let (Some(file), [Some(major), Some(minor), Some(x), Some(y)]) = (file, numbers) else {
-            return Err(wrong(format!("cannot read `{line}`")));
+            return Err(wrong_file(&table, &format!("cannot read `{line}`")));
         };
         // The ellipse may lie on its side; the smaller radius is the half width.
         let half = major.min(minor);
@@ -88,14 +87,18 @@ pub fn fddb(data: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
     Ok(count)
 }
 
+/// The failure on a file of the faces.
+fn wrong_file(file: &Path, why: &dyn std::fmt::Display) -> Failure {
+    Failure::failed(format!("{}: {why}", file.display()))
+}
+
 /// Passes the crops of CBCL, of faces and of other things.
 fn cbcl(archive: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
-    let wrong = |why: String| Failure::failed(format!("{}: {why}", archive.display()));
-    let file = fs::File::open(archive).map_err(|error| wrong(error.to_string()))?;
+    let file = fs::File::open(archive).map_err(|error| wrong_file(archive, &error))?;
     let mut bytes = Vec::new();
     // A damaged or hostile archive must not fill the memory.
     let unpacked = GzDecoder::new(file).take(MOST_BYTES).read_to_end(&mut bytes);
-    unpacked.map_err(|error| wrong(error.to_string()))?;
+    unpacked.map_err(|error| wrong_file(archive, &error))?;
     let mut count = 0;
     for (name, content) in members(&bytes) {
         let group = fingerprint(name);
@@ -103,7 +106,7 @@ fn cbcl(archive: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
             continue;
         }
         let image = image::load_from_memory(content)
-            .map_err(|error| wrong(format!("{name}: {error}")))?
+            .map_err(|error| wrong_file(archive, &format!("{name}: {error}")))?
             .into_luma8();
         let width = image.width() as usize;
         let height = image.height() as usize;

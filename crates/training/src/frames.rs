@@ -53,8 +53,8 @@ pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome
     session.bar.set_message("fitting");
     session.bar.set_position(0);
     session.bar.set_length(1000);
-    let tell = &mut |part: f64| session.bar.set_position((1000.0 * part) as u64);
-    let fitted = trainer.fit(tell).map_err(Failure::failed)?;
+    let fitted = trainer.fit(&mut |part| session.bar.set_position((1000.0 * part) as u64));
+    let fitted = fitted.map_err(Failure::failed)?;
     session.bar.finish_and_clear();
     write_file(&session.model, &fitted.model)?;
     let path = session.model.with_extension("card.toml");
@@ -187,14 +187,13 @@ impl RealTruth {
 
     /// Returns the people in a frame.
     fn people(&self, frame: &Frame) -> Vec<AnnotatedPerson> {
-        let is_here = |number: u32| u64::from(number) == frame.index;
         match self {
             Self::People(rows) => {
-                let here = rows.iter().filter(|row| is_here(row.frame));
+                let here = rows.iter().filter(|row| u64::from(row.frame) == frame.index);
                 here.filter_map(|row| of_row(row, frame)).collect()
             }
             Self::Boxes(rows) => {
-                let here = rows.iter().filter(|row| is_here(row.frame));
+                let here = rows.iter().filter(|row| u64::from(row.frame) == frame.index);
                 here.filter_map(|row| of_box(&row.region, frame)).collect()
             }
         }

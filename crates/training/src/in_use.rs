@@ -37,10 +37,7 @@ impl InUse {
     /// # Errors
     /// A file that cannot be read or is no TOML.
     pub fn as_it_is(path: &Path) -> Result<Self, Failure> {
-        let wrong = |why: String| Failure::usage(format!("{}: {why}", path.display()));
-        let text = read_text(path, FileLimit::Config).map_err(|error| wrong(error.to_string()))?;
-        let config = text.parse().map_err(|error: toml::de::Error| wrong(error.to_string()))?;
-        Ok(Self { config: without_verifiers(config), is_lowered: false })
+        Ok(Self { config: without_verifiers(read_table(path)?), is_lowered: false })
     }
 
     /// Returns the settings for depth from a pair.
@@ -92,6 +89,13 @@ impl InUse {
         config.extend(low);
         Ok(config.to_string())
     }
+}
+
+/// Reads a file of TOML; a failure names the file.
+pub(super) fn read_table(path: &Path) -> Result<Table, Failure> {
+    let text = read_text(path, FileLimit::Config).map_err(|error| error.to_string());
+    text.and_then(|text| text.parse().map_err(|error: toml::de::Error| error.to_string()))
+        .map_err(|why| Failure::usage(format!("{}: {why}", path.display())))
 }
 
 /// Builds a pipeline from the text of its config.

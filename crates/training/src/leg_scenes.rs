@@ -69,13 +69,9 @@ pub fn frame(scan: LaserScan) -> Frame {
 fn scene(seed: u64) -> Scene {
     let mut chance = SplitMix64::new(seed);
     let size_m = [chance.between(5.0, 16.0), chance.between(3.0, 10.0)];
-    let mut place = || {
-        let [length, width] = size_m;
-        [chance.between(0.5, length - 0.5), chance.between(0.5, width - 0.5)]
-    };
-    let start = place();
-    let end = place();
-    let places: Vec<[f64; 2]> = (0..24).map(|_| place()).collect();
+    let start = place_in(size_m, &mut chance);
+    let end = place_in(size_m, &mut chance);
+    let places: Vec<[f64; 2]> = (0..24).map(|_| place_in(size_m, &mut chance)).collect();
     let (standing, rest) = places.split_at(3);
     let (walking, things) = rest.split_at(9);
     let pieces = 4 + (chance.uniform() * 8.0) as usize;
@@ -112,6 +108,11 @@ fn scene(seed: u64) -> Scene {
         people,
         ..Scene::default()
     }
+}
+
+/// Draws a place that is not at a wall.
+fn place_in([length, width]: [f64; 2], chance: &mut SplitMix64) -> [f64; 2] {
+    [chance.between(0.5, length - 0.5), chance.between(0.5, width - 0.5)]
 }
 
 fn person(path: &[[f64; 2]], speed_mps: f64) -> PersonSettings {

@@ -51,19 +51,19 @@ pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome
     scans += simulated;
     session.tell(0, "fitting");
     session.bar.set_length(1000);
-    let tell = &mut |part: f64| session.bar.set_position((1000.0 * part) as u64);
-    let fitted = trainer.fit(tell).map_err(Failure::failed)?;
+    let fitted = trainer.fit(&mut |part| session.bar.set_position((1000.0 * part) as u64));
+    let fitted = fitted.map_err(Failure::failed)?;
     session.bar.finish_and_clear();
     write_file(&session.model, &fitted.model)?;
-    let name = |bag: &PathBuf| {
+    let trained_on = bags.iter().map(|bag| {
         let name = bag.file_name().map(|name| name.to_string_lossy().into_owned());
         format!("{FOLDER}/{}", name.unwrap_or_default())
-    };
+    });
     let card = LegCard {
         plugin: session.args.plugin.clone(),
         quick: session.args.quick,
         seed: session.args.seed,
-        trained_on: bags.iter().map(name).collect(),
+        trained_on: trained_on.collect(),
         scans,
         simulated_scans: simulated,
         fit: fitted.figures,
@@ -97,19 +97,24 @@ fn add_scenes(session: &Session<'_>, trainer: &mut dyn Trainer) -> Result<usize,
 
 /// Returns the bags in the order of their names.
 fn bags(session: &Session<'_>) -> Result<Vec<PathBuf>, Failure> {
-    let why = |folder: &str| {
-        let text = format!("is trained on bags of laser scans: name a folder with {FOLDER}");
-        Failure::usage(format!("`{}` {text} with --data{folder}", session.args.plugin))
-    };
-    let data = session.args.data.as_ref().ok_or_else(|| why(""))?;
+    let data = session.args.data.as_ref().ok_or_else(|| no_bags(session, ""))?;
     let folder = data.join(FOLDER);
     let entries = std::fs::read_dir(&folder)
-        .map_err(|error| why(&format!("; {}: {error}", folder.display())))?;
+        .map_err(|error| no_bags(session, &format!("; {}: {error}", folder.display())))?;
     let paths = entries.flatten().map(|entry| entry.path());
     let mut bags: Vec<PathBuf> =
         paths.filter(|path| path.extension().is_some_and(|e| e == "bag")).collect();
     bags.sort();
-    if bags.is_empty() { Err(why(&format!("; {} has none", folder.display()))) } else { Ok(bags) }
+    if bags.is_empty() {
+        return Err(no_bags(session, &format!("; {} has none", folder.display())));
+    }
+    Ok(bags)
+}
+
+/// The refusal where there is no bag, with the reason.
+fn no_bags(session: &Session<'_>, why: &str) -> Failure {
+    let text = format!("is trained on bags of laser scans: name a folder with {FOLDER}");
+    Failure::usage(format!("`{}` {text} with --data{why}", session.args.plugin))
 }
 
 /// Passes the scans of a bag to the trainer; returns their number.
@@ -135,10 +140,11 @@ fn add_bag(bag: &Path, quick: bool, trainer: &mut dyn Trainer) -> Result<usize, 
 /// Passes the legs of a scan to the trainer, and then the scan as a whole.
 fn add_scan(scan: &LegScan, group: u64, trainer: &mut dyn Trainer) -> Result<(), Failure> {
     let frame = frame(scan.scan.clone());
-    let mut add = |x: f64, y: f64, is_person: bool| {
+    let legs = scan.legs.iter().map(|leg| (leg.x, leg.y, true));
+    for (x, y, is_person) in legs.chain([(0.0, 0.0, false)]) {
         let candidate = Detection::new("annotation", Point3::new(x, y, 0.0), Matrix3::zeros(), 0.0);
-        trainer.add(&frame, &candidate, Example { is_person, group }).map_err(Failure::failed)
-    };
-    scan.legs.iter().try_for_each(|leg| add(leg.x, leg.y, true))?;
-    add(0.0, 0.0, false)
+        let added = trainer.add(&frame, &candidate, Example { is_person, group });
+        added.map_err(Failure::failed)?;
+    }
+    Ok(())
 }

@@ -48,13 +48,16 @@ fn most_alike(shown: &[(Use, Vec<f32>)]) -> f32 {
         a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>()
     }
 
-    let of = |is_fit: bool| shown.iter().filter(move |(use_, _)| (*use_ == Use::Fit) == is_fit);
-    assert!(of(true).count() > 100 && of(false).count() > 50, "{}", shown.len());
-    let alike = of(false).flat_map(|(_, tested)| {
-        let both = [tested.clone(), mirrored(tested)];
-        of(true).map(move |(_, trained)| product(&both[0], trained).max(product(&both[1], trained)))
-    });
-    alike.fold(f32::MIN, f32::max)
+    let (fitted, tested): (Vec<_>, Vec<_>) = shown.iter().partition(|(use_, _)| *use_ == Use::Fit);
+    assert!(fitted.len() > 100 && tested.len() > 50, "{}", shown.len());
+    let mut most = f32::MIN;
+    for (_, tested) in tested {
+        let mirrored = mirrored(tested);
+        for (_, trained) in &fitted {
+            most = most.max(product(tested, trained)).max(product(&mirrored, trained));
+        }
+    }
+    most
 }
 
 /// Returns the same for photographs of some kind.

@@ -111,15 +111,15 @@ fn take(
     first: u64,
     trainer: &mut dyn Trainer,
 ) -> Result<(), Failure> {
-    let mut add = |at, example| {
-        let candidate = Detection::new("truth", at, Matrix3::zeros(), 0.0);
-        trainer.add(frame, &candidate, example).map_err(Failure::failed)
-    };
     // Frames without people are needed, too: the trainer learns the background from them.
-    add(nalgebra::Point3::origin(), Example { is_person: false, group: first })?;
+    let mut shown = vec![(nalgebra::Point3::origin(), Example { is_person: false, group: first })];
     for person in truth.iter().filter(|person| !person.ignore) {
         let group = first + u64::from(person.id);
-        add(person.head_in_robot, Example { is_person: true, group })?;
+        shown.push((person.head_in_robot, Example { is_person: true, group }));
+    }
+    for (at, example) in shown {
+        let candidate = Detection::new("truth", at, Matrix3::zeros(), 0.0);
+        trainer.add(frame, &candidate, example).map_err(Failure::failed)?;
     }
     Ok(())
 }

@@ -95,7 +95,7 @@ fn runs(crops: &[PathBuf]) -> Vec<u64> {
     }
 
     let taken: BTreeSet<(String, u64)> = crops.iter().map(|crop| numbered(crop)).collect();
-    let first = |crop: &PathBuf| {
+    let runs = crops.iter().map(|crop| {
         let (series, number) = numbered(crop);
         let first = std::iter::successors(Some(number), |number: &u64| {
             let before = number.checked_sub(1)?;
@@ -103,8 +103,8 @@ fn runs(crops: &[PathBuf]) -> Vec<u64> {
         })
         .last();
         fingerprint(&format!("{series}{}", first.unwrap_or(number)))
-    };
-    crops.iter().map(first).collect()
+    });
+    runs.collect()
 }
 
 /// Returns a number for a name (FNV-1a).
@@ -164,14 +164,22 @@ impl PictureSignature {
 
     fn of(image: &GreyImage) -> Self {
         let small = mean_cells(image, Self::SMALL, Self::SMALL);
-        let row = |y: usize| &small[y * Self::SMALL..(y + 1) * Self::SMALL];
-        let patch = |left: usize, top: usize, is_mirrored: bool| {
-            patch(|x, y| row(top + y)[if is_mirrored { Self::PATCH - 1 - x } else { x } + left])
-        };
         let room = Self::SMALL - Self::PATCH;
-        let cuts = (0..=room).flat_map(|top| (0..=room).map(move |left| (left, top)));
-        let all = cuts.flat_map(|(left, top)| [false, true].map(|turned| patch(left, top, turned)));
-        Self { middle: patch(room / 2, room / 2, false), all: all.collect() }
+        let mut all = Vec::new();
+        for top in 0..=room {
+            for left in 0..=room {
+                all.extend([false, true].map(|turned| Self::patch_at(&small, left, top, turned)));
+            }
+        }
+        Self { middle: Self::patch_at(&small, room / 2, room / 2, false), all }
+    }
+
+    /// A part of the small image, mirrored or not.
+    fn patch_at(small: &[f32], left: usize, top: usize, is_mirrored: bool) -> Patch {
+        patch(|x, y| {
+            let across = if is_mirrored { Self::PATCH - 1 - x } else { x };
+            small[(top + y) * Self::SMALL + left + across]
+        })
     }
 
     fn is_like(&self, other: &Self) -> bool {
@@ -179,8 +187,8 @@ impl PictureSignature {
             a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>()
         }
 
-        let shows = |all: &[Patch], middle| all.iter().any(|p| product(p, middle) >= Self::ALIKE);
-        shows(&self.all, &other.middle) || shows(&other.all, &self.middle)
+        self.all.iter().any(|patch| product(patch, &other.middle) >= Self::ALIKE)
+            || other.all.iter().any(|patch| product(patch, &self.middle) >= Self::ALIKE)
     }
 }
 
@@ -207,14 +215,14 @@ pub fn mean_cells(image: &GreyImage, columns: usize, rows: usize) -> Vec<f32> {
         let from = i * size / of;
         from..((i + 1) * size / of).max(from + 1)
     }
-    let mean = |column: usize, row: usize| {
-        let xs = part(column, columns, image.width());
-        let ys = part(row, rows, image.height());
+    let means = (0..columns * rows).map(|at| {
+        let xs = part(at % columns, columns, image.width());
+        let ys = part(at / columns, rows, image.height());
         let count = (xs.len() * ys.len()) as f32;
         ys.map(|y| image.row(y)[xs.clone()].iter().map(|v| f32::from(*v)).sum::<f32>()).sum::<f32>()
             / count
-    };
-    (0..columns * rows).map(|at| mean(at % columns, at / columns)).collect()
+    });
+    means.collect()
 }
 
 /// Reads a picture as grey values.
@@ -311,10 +319,14 @@ mod tests {
 
     #[test]
     fn crops_of_one_photograph_are_one_group() {
-        let name = |name: &str| photograph(Path::new(name));
-        assert_eq!(name("crop001248a.png"), name("crop001248c.png"));
-        assert_eq!(name("125_8.jpg"), name("125_11.jpg"));
-        assert_ne!(name("125_8.jpg"), name("126_8.jpg"));
+        for (one, other, are_same) in [
+            ("crop001248a.png", "crop001248c.png", true),
+            ("125_8.jpg", "125_11.jpg", true),
+            ("125_8.jpg", "126_8.jpg", false),
+        ] {
+            let [one, other] = [one, other].map(|name| photograph(Path::new(name)));
+            assert_eq!(one == other, are_same, "{one} {other}");
+        }
     }
 
     #[test]

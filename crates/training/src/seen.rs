@@ -57,21 +57,25 @@ const NOBODY_M: f64 = 0.9;
 /// Returns the label of a candidate, by the truth.
 pub fn label(candidate: &Detection, people: &[Known]) -> Label {
     let at = candidate.position.xy();
-    let off = |known: &&Known| (known.floor - at).norm();
-    let Some(nearest) = people.iter().min_by(|a, b| off(a).total_cmp(&off(b))) else {
+    let off = people.iter().map(|known| (known, (known.floor - at).norm()));
+    let Some((nearest, off_m)) = off.min_by(|a, b| a.1.total_cmp(&b.1)) else {
         return Label::Nobody;
     };
-    let overlap = |known: &Known| {
-        known.region.zip(candidate.rect()).map_or(0.0, |(known, seen)| known.iou(&seen))
-    };
-    let covers_nobody = people.iter().all(|known| overlap(known) < 0.2);
-    match off(&nearest) {
-        _ if nearest.ignore && off(&nearest) <= NOBODY_M => Label::Unclear,
-        m if m <= SAME_M && overlap(nearest) >= SAME_OVERLAP => Label::Person(nearest.id),
+    let covers_nobody = people.iter().all(|known| overlap_with(known, candidate) < 0.2);
+    match off_m {
+        m if m <= NOBODY_M && nearest.ignore => Label::Unclear,
+        m if m <= SAME_M && overlap_with(nearest, candidate) >= SAME_OVERLAP => {
+            Label::Person(nearest.id)
+        }
         m if m <= SAME_M => Label::Part,
         m if m > NOBODY_M && covers_nobody => Label::Nobody,
         _ => Label::Unclear,
     }
+}
+
+/// The overlap of a candidate with a known person, where both have a region.
+fn overlap_with(known: &Known, candidate: &Detection) -> f64 {
+    known.region.zip(candidate.rect()).map_or(0.0, |(known, seen)| known.iou(&seen))
 }
 
 /// Callback for each frame.

@@ -15,7 +15,7 @@ use toml::de::DeTable;
 use super::args::{TEST_LOGS, TRAIN_LOGS, TrainArgs};
 use super::card::CandidateCounts;
 use super::held_out::{Comparison, Effect, Tally};
-use super::in_use::{InUse, pipeline};
+use super::in_use::{InUse, pipeline, read_table};
 use super::photos::{self, fingerprint, photos};
 use super::plan::Plan;
 use super::rooms::ImageTiming;
@@ -315,10 +315,7 @@ fn scene_text(path: &Path) -> Result<String, Failure> {
 
 /// Reads the settings of a plugin, if there are any.
 fn settings(path: Option<&Path>) -> Result<toml::Table, Failure> {
-    let Some(path) = path else { return Ok(toml::Table::new()) };
-    let wrong = |why: String| Failure::usage(format!("{}: {why}", path.display()));
-    let text = read_text(path, FileLimit::Config).map_err(|error| wrong(error.to_string()))?;
-    text.parse().map_err(|error: toml::de::Error| wrong(error.to_string()))
+    path.map_or_else(|| Ok(toml::Table::new()), read_table)
 }
 
 /// Builds something from a table of settings.

@@ -189,14 +189,20 @@ mod tests {
             let text = toml::to_string(scene).unwrap();
             assert_eq!(Scene::parse(&text).unwrap().seed, scene.seed, "{text}");
         }
-        let count = |is: &dyn Fn(&Scene) -> bool| scenes.iter().filter(|scene| is(scene)).count();
-        assert!(count(&|scene| scene.room.size_m[1] < 2.5) > 20, "corridors");
-        assert!(count(&|scene| scene.camera.height_m < 0.8) > 50, "small robots");
-        assert!(count(&|scene| scene.camera.height_m > 1.6) > 30, "cameras under the ceiling");
-        assert!(count(&|scene| scene.people.is_empty()) > 10, "empty rooms");
-        assert!(
-            count(&|scene| scene.people.iter().any(|p| p.posture == Posture::Seated)) > 30,
-            "seated people"
-        );
+        let kinds: [(fn(&Scene) -> bool, usize, &str); 5] = [
+            (|scene| scene.room.size_m[1] < 2.5, 20, "corridors"),
+            (|scene| scene.camera.height_m < 0.8, 50, "small robots"),
+            (|scene| scene.camera.height_m > 1.6, 30, "cameras under the ceiling"),
+            (|scene| scene.people.is_empty(), 10, "empty rooms"),
+            (
+                |scene| scene.people.iter().any(|p| p.posture == Posture::Seated),
+                30,
+                "seated people",
+            ),
+        ];
+        for (is_of, least, kind) in kinds {
+            let count = scenes.iter().filter(|scene| is_of(scene)).count();
+            assert!(count > least, "{kind}: {count}");
+        }
     }
 }

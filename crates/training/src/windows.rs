@@ -48,8 +48,8 @@ pub(super) fn train(
     session.bar.set_message("fitting");
     session.bar.set_position(0);
     session.bar.set_length(1000);
-    let tell = &mut |part: f64| session.bar.set_position((1000.0 * part) as u64);
-    let fitted = trainer.fit(tell).map_err(Failure::failed)?;
+    let fitted = trainer.fit(&mut |part| session.bar.set_position((1000.0 * part) as u64));
+    let fitted = fitted.map_err(Failure::failed)?;
     session.bar.finish_and_clear();
     write_file(&session.model, &fitted.model)?;
     frames::write_left_out(session, &fitted.without)?;

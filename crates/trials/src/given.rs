@@ -307,12 +307,14 @@ mod tests {
         let folder = folder();
         let other = folder.path().join("other");
         fs::create_dir_all(other.join("Walk-1")).unwrap();
-        let read = || GivenSequence::read_all(folder.path(), Some(&other));
-        assert!(read().unwrap_err().to_string().contains("Walk-1.txt"));
+        let missing = GivenSequence::read_all(folder.path(), Some(&other)).unwrap_err();
+        assert!(missing.to_string().contains("Walk-1.txt"));
         fs::write(other.join("Walk-1.txt"), "").unwrap();
-        assert_eq!(read().unwrap()[0].frames[1].recorded().unwrap().len(), 0);
+        let beside = GivenSequence::read_all(folder.path(), Some(&other)).unwrap();
+        assert_eq!(beside[0].frames[1].recorded().unwrap().len(), 0);
         fs::write(other.join("Walk-1/det.txt"), "3,-1,1,1,9,9,0.5\n").unwrap();
-        assert_eq!(read().unwrap()[0].frames[2].recorded().unwrap()[0].score, 0.5);
+        let inside = GivenSequence::read_all(folder.path(), Some(&other)).unwrap();
+        assert_eq!(inside[0].frames[2].recorded().unwrap()[0].score, 0.5);
     }
 
     #[test]

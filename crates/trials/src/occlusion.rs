@@ -102,21 +102,23 @@ fn occlusion(
 /// Returns the fate of the person's track.
 pub fn outcome(trial: &Trial, run: &Run, occlusion: &Occlusion) -> Outcome {
     let Occlusion { person, first, again, .. } = *occlusion;
-    let near = |index: usize| track_at(trial, &run.reports[index], index, person);
-    let within = |from: usize, index: usize| {
-        let a = trial.moments[from].stamp;
-        let b = trial.moments[index].stamp;
-        b.seconds_since(a).abs() <= PATIENCE_S
-    };
-    let mut earlier = (0..first).rev().take_while(|index| within(first, *index));
-    let Some(before) = earlier.find_map(near) else { return Outcome::Untracked };
-    let mut later = (again..trial.moments.len()).take_while(|index| within(again, *index));
-    match later.find_map(near) {
+    let mut earlier = (0..first).rev().take_while(|index| are_close(trial, first, *index));
+    let before = earlier.find_map(|index| track_at(trial, &run.reports[index], index, person));
+    let Some(before) = before else { return Outcome::Untracked };
+    let mut later = (again..trial.moments.len()).take_while(|at| are_close(trial, again, *at));
+    match later.find_map(|index| track_at(trial, &run.reports[index], index, person)) {
         None => Outcome::Lost,
         Some(after) if after == before => Outcome::Kept,
         Some(after) if existed(&run.reports[..first], after) => Outcome::Swapped,
         Some(_) => Outcome::Renamed,
     }
+}
+
+/// Whether two moments are so close that a track of the one counts at the other.
+fn are_close(trial: &Trial, from: usize, index: usize) -> bool {
+    let a = trial.moments[from].stamp;
+    let b = trial.moments[index].stamp;
+    b.seconds_since(a).abs() <= PATIENCE_S
 }
 
 fn existed(reports: &[FrameReport], id: TrackId) -> bool {

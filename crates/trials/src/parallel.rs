@@ -38,25 +38,18 @@ pub fn in_order<S: Sync, T: Send>(
 ) -> Result<Vec<T>, TrialError> {
     let next = AtomicUsize::new(0);
     let through = AtomicUsize::new(0);
-    let worker = || {
-        let mut kept = Vec::new();
-        while let Some((at, thing)) = take(things, &next) {
-            let result = work(thing);
-            let failed = result.is_err();
-            kept.push((at, result));
-            done(through.fetch_add(1, Ordering::Relaxed) + 1);
-            if failed {
-                // The others need not go on.
-                next.store(things.len(), Ordering::Relaxed);
-            }
-        }
-        kept
-    };
     let mut all = std::thread::scope(|scope| {
-        // Without another thread, those that run do its work.
-        let starts = (1..threads).map(|_| std::thread::Builder::new().spawn_scoped(scope, worker));
-        let others: Vec<_> = starts.filter_map(Result::ok).collect();
-        let mut all = worker();
+        let mut others = Vec::new();
+        for _ in 1..threads {
+            let start = std::thread::Builder::new();
+            // Without another thread, those that run do its work.
+            others.extend(
+                start
+                    .spawn_scoped(scope, || work_off(things, [&next, &through], &work, &done))
+                    .ok(),
+            );
+        }
+        let mut all = work_off(things, [&next, &through], &work, &done);
         for other in others {
             all.extend(other.join().map_err(|_| TrialError::Panicked)?);
         }
@@ -64,6 +57,27 @@ pub fn in_order<S: Sync, T: Send>(
     })?;
     all.sort_by_key(|(at, _)| *at);
     all.into_iter().map(|(_, result)| result).collect()
+}
+
+/// Does the next thing until there is none, and returns the results with the places of the things.
+fn work_off<S, T>(
+    things: &[S],
+    [next, through]: [&AtomicUsize; 2],
+    work: &impl Fn(&S) -> Result<T, TrialError>,
+    done: &impl Fn(usize),
+) -> Vec<(usize, Result<T, TrialError>)> {
+    let mut kept = Vec::new();
+    while let Some((at, thing)) = take(things, next) {
+        let result = work(thing);
+        let failed = result.is_err();
+        kept.push((at, result));
+        done(through.fetch_add(1, Ordering::Relaxed) + 1);
+        if failed {
+            // The others need not go on.
+            next.store(things.len(), Ordering::Relaxed);
+        }
+    }
+    kept
 }
 
 fn take<'a, S>(things: &'a [S], next: &AtomicUsize) -> Option<(usize, &'a S)> {

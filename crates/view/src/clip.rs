@@ -27,8 +27,8 @@ pub fn write(args: &ViewArgs, file: &Path) -> Outcome {
     let wanted: Vec<u64> = chosen.into_iter().map(|at| shown[at]).collect();
     let moments = run[0].moments.iter().filter(|m| wanted.contains(&m.notes.stamp_ns));
     let overlay = args.run.join("overlay");
-    let picture = |frame: u64| overlay.join(format!("{frame:06}.png"));
-    let pictures: Vec<PathBuf> = moments.map(|m| picture(m.notes.frame)).collect();
+    let pictures: Vec<PathBuf> =
+        moments.map(|m| overlay.join(format!("{:06}.png", m.notes.frame))).collect();
     if !pictures.iter().any(|path| path.is_file()) {
         return Err(Failure::usage(format!(
             "{} has no pictures: repeat the run with --overlay",

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::page::moment::{Moment, TrackState};
 use serde::Deserialize;
+use serde::de::DeserializeOwned;
 use tagalong_app::frame_notes::{FRAME_NOTES_TOPIC, FrameNotes};
 use tagalong_app::origin::Origin;
 use tagalong_app::outcome::Failure;
@@ -266,19 +267,18 @@ impl Frames {
     /// Returns the next frame; none at the end. A frame that was cut in two is left out.
     fn next_moment(&mut self) -> Result<Option<Moment>, Failure> {
         let shown = &self.shown;
-        let broken = |why: &dyn std::fmt::Display| Failure::failed(format!("{shown}: {why}"));
         while let Some(message) = self.walker.next() {
             let topic = message.channel.topic.as_str();
             if !matches!(topic, TRACKS_TOPIC | FRAME_NOTES_TOPIC) {
                 continue;
             }
-            let text: StringMsg = decode(message.data).map_err(|error| broken(&error))?;
-            let unread = |error: serde_json::Error| broken(&format!("{topic}: {error}"));
+            let text: StringMsg = decode(message.data)
+                .map_err(|error| Failure::failed(format!("{shown}: {error}")))?;
             if topic == TRACKS_TOPIC {
-                self.tracks = Some(serde_json::from_str(&text.data).map_err(unread)?);
+                self.tracks = Some(json_of_topic(&text.data, shown, topic)?);
                 continue;
             }
-            let notes: FrameNotes = serde_json::from_str(&text.data).map_err(unread)?;
+            let notes: FrameNotes = json_of_topic(&text.data, shown, topic)?;
             let found = self.tracks.take().filter(|found| found.stamp_ns == notes.stamp_ns);
             let (tracks, target) =
                 found.map(|found| (found.tracks, found.target)).unwrap_or_default();
@@ -294,6 +294,11 @@ impl Frames {
             self.shown
         ))
     }
+}
+
+/// Reads the JSON of a message; a failure names its file and topic.
+fn json_of_topic<T: DeserializeOwned>(text: &str, file: &str, topic: &str) -> Result<T, Failure> {
+    serde_json::from_str(text).map_err(|error| Failure::failed(format!("{file}: {topic}: {error}")))
 }
 
 /// Returns the failure of a window without a frame.

@@ -94,14 +94,13 @@ impl PageTruth {
     }
 
     fn sequence(&self, times: &[f64], size: [usize; 2], run: &[Option<FrameData>]) -> Sequence {
-        let frame = |(at, (truths, regions)): (usize, &(Vec<Truth>, Vec<Region>))| Frame {
+        let frames = self.people.iter().enumerate().map(|(at, (truths, regions))| Frame {
             stamp_ns: (times[at] * 1e9).round() as i64,
             truths: truths.clone(),
             reports: run[at].as_ref().map(|frame| reports(frame, size)).unwrap_or_default(),
             ignore_regions: regions.clone(),
-        };
-        let frames = self.people.iter().enumerate().map(frame).collect();
-        Sequence { name: "page".into(), frames }
+        });
+        Sequence { name: "page".into(), frames: frames.collect() }
     }
 }
 
@@ -123,7 +122,7 @@ fn shown(truth: &Truth, odom_from_robot: &Isometry2<f64>) -> TruthBox {
 fn reports(frame: &FrameData, size: [usize; 2]) -> Vec<Report> {
     let (sin, cos) = frame.robot[2].sin_cos();
     let seen = frame.tracks.iter().filter(|track| track.state == "seen");
-    let report = |track: &crate::page::data::TrackData| {
+    let reports = seen.map(|track| {
         let [x, y, width, height] = track.box_px;
         let inside = Rect::new(x, y, width, height).clipped(size[0], size[1]);
         let dx = track.at[0] - frame.robot[0];
@@ -134,8 +133,8 @@ fn reports(frame: &FrameData, size: [usize; 2]) -> Vec<Report> {
             floor_m: Some([cos * dx + sin * dy, cos * dy - sin * dx]),
             score: track.p,
         }
-    };
-    seen.map(report).collect()
+    });
+    reports.collect()
 }
 
 /// Describes an event of the comparison; people found again are told by the run itself.
@@ -175,10 +174,13 @@ mod tests {
             frames: boxes
                 .iter()
                 .map(|box_px| {
-                    let track =
-                        |box_px| TrackData { id: 7, state: "seen", box_px, ..TrackData::default() };
-                    let tracks = box_px.iter().map(|b| track(*b)).collect();
-                    Some(FrameData { tracks, ..FrameData::default() })
+                    let tracks = box_px.map(|box_px| TrackData {
+                        id: 7,
+                        state: "seen",
+                        box_px,
+                        ..TrackData::default()
+                    });
+                    Some(FrameData { tracks: tracks.into_iter().collect(), ..FrameData::default() })
                 })
                 .collect(),
             ..RunData::default()

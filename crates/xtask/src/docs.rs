@@ -55,15 +55,14 @@ struct Document {
 
 /// Fills the parts whose command contains `slow`, or those that are fast.
 pub fn fill(workspace: &Workspace, slow: Option<&str>) -> Result<()> {
-    let wanted = |command: &str| match slow {
-        Some(part) => command.contains(part),
-        None => !is_slow(command),
-    };
     let mut programs = Programs::default();
     for document in documents(workspace)? {
-        let filled =
-            filled(&document.text, wanted, |command| printed(workspace, &mut programs, command))
-                .with_context(|| format!("in {}", document.path.display()))?;
+        let filled = filled(
+            &document.text,
+            |command| slow.map_or(!is_slow(command), |part| command.contains(part)),
+            |command| printed(workspace, &mut programs, command),
+        )
+        .with_context(|| format!("in {}", document.path.display()))?;
         let filled = sentences::filled(workspace, &document.path, &filled)?;
         if filled != document.text {
             workspace.write(&document.path, &filled)?;
@@ -379,13 +378,17 @@ mod tests {
 
     #[test]
     fn fast_parts_are_filled_and_slow_ones_left() {
-        let print = |command: &str| Ok(format!("[{command}]\n"));
-        let out = filled(TEXT, |command| !is_slow(command), print).unwrap();
+        let out = filled(TEXT, |command| !is_slow(command), print_name).unwrap();
         assert!(
             out.contains("<!-- begin: tagalong list -->\n\n[tagalong list]\n\n<!-- end -->\nb")
         );
         assert!(out.contains("\ntable\n") && out.ends_with("c\n"), "{out}");
-        assert_eq!(filled(&out, |command| !is_slow(command), print).unwrap(), out);
+        assert_eq!(filled(&out, |command| !is_slow(command), print_name).unwrap(), out);
+    }
+
+    /// The name of a command as that which it prints.
+    fn print_name(command: &str) -> Result<String> {
+        Ok(format!("[{command}]\n"))
     }
 
     #[test]

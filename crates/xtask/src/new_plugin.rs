@@ -71,15 +71,18 @@ pub fn create(workspace: &Workspace, kind: Kind, name: &str) -> Result<()> {
     check_name(workspace, name)?;
     let lists = lists_with(workspace, name)?;
     let template = kind.template();
-    let fill = |text: &str| fill(text, name);
     let folder = format!("plugins/{name}");
     let (verb, verb_text) = template.verb;
-    workspace.write(format!("{folder}/Cargo.toml"), &fill(MANIFEST))?;
-    workspace.write(format!("{folder}/README.md"), &fill(template.readme))?;
-    workspace.write(format!("{folder}/src/lib.rs"), &fill(template.lib))?;
-    workspace.write(format!("{folder}/src/config.rs"), &fill(template.config))?;
-    workspace.write(format!("{folder}/src/{verb}.rs"), &fill(verb_text))?;
-    workspace.write(format!("configs/{name}.toml"), &fill(template.pipeline))?;
+    for (path, text) in [
+        (format!("{folder}/Cargo.toml"), MANIFEST),
+        (format!("{folder}/README.md"), template.readme),
+        (format!("{folder}/src/lib.rs"), template.lib),
+        (format!("{folder}/src/config.rs"), template.config),
+        (format!("{folder}/src/{verb}.rs"), verb_text),
+        (format!("configs/{name}.toml"), template.pipeline),
+    ] {
+        workspace.write(path, &fill(text, name))?;
+    }
     lists.iter().try_for_each(|(path, text)| workspace.write(path, text))
 }
 
@@ -136,27 +139,37 @@ const BUILT_IN: &str = "crates/pipeline/src/config/builtin.rs";
 
 /// The files that list all plugins and their configs, with the new one in its place.
 fn lists_with(workspace: &Workspace, name: &str) -> Result<[(&'static str, String); 4]> {
-    let list = |path, line: String, is_sibling: fn(&str) -> bool| -> Result<_> {
-        let text = insert_sorted(&workspace.read(path)?, &line, is_sibling);
-        Ok((path, text.with_context(|| format!("{path}: no place for the line `{line}`"))?))
-    };
     let package = format!("tagalong-{name}");
     let register = format!("    {}::register(registry);", package.replace('-', "_"));
     Ok([
-        list("Cargo.toml", dependency(name), |line| {
+        list_with(workspace, "Cargo.toml", &dependency(name), |line| {
             line.starts_with("tagalong-") && line.contains("path = \"plugins/")
         })?,
-        list("crates/catalog/Cargo.toml", format!("{package}.workspace = true"), |line| {
-            line.starts_with("tagalong-")
-        })?,
-        list("crates/catalog/src/lib.rs", register, |line| {
+        list_with(
+            workspace,
+            "crates/catalog/Cargo.toml",
+            &format!("{package}.workspace = true"),
+            |line| line.starts_with("tagalong-"),
+        )?,
+        list_with(workspace, "crates/catalog/src/lib.rs", &register, |line| {
             line.starts_with("    tagalong_") && line.ends_with("::register(registry);")
         })?,
-        list(BUILT_IN, format!("    \"{name}\""), |line| {
+        list_with(workspace, BUILT_IN, &format!("    \"{name}\""), |line| {
             // The lines of the macro, and none of a list with commas.
             line.starts_with("    \"") && line.ends_with('"')
         })?,
     ])
+}
+
+/// A file and its text with one more line among its siblings.
+fn list_with(
+    workspace: &Workspace,
+    path: &'static str,
+    line: &str,
+    is_sibling: fn(&str) -> bool,
+) -> Result<(&'static str, String)> {
+    let text = insert_sorted(&workspace.read(path)?, line, is_sibling);
+    Ok((path, text.with_context(|| format!("{path}: no place for the line `{line}`"))?))
 }
 
 /// Returns the line of a plugin in the dependencies of the workspace, whose crates share a version.

@@ -61,19 +61,21 @@ fn build(
         unpacked.len(),
         stranger.display()
     );
-    let cargo = |words: &[&str]| {
-        let mut cargo = Command::new("cargo");
-        cargo.args(words).current_dir(stranger).env("CARGO_TARGET_DIR", target);
-        succeed(&mut cargo)
-    };
-    cargo(&["check", "--quiet", "--bins"])?;
+    run_cargo(stranger, target, &["check", "--quiet", "--bins"])?;
     if run {
         for example in RUNNABLE {
-            cargo(&["run", "--quiet", "--bin", example])?;
+            run_cargo(stranger, target, &["run", "--quiet", "--bin", example])?;
         }
     }
     eprintln!("package: the packages compile, and so do the examples of the library");
     Ok(())
+}
+
+/// Runs cargo in a folder, with a target folder of its own.
+fn run_cargo(folder: &Path, target: &Path, words: &[&str]) -> Result<()> {
+    let mut cargo = Command::new("cargo");
+    cargo.args(words).current_dir(folder).env("CARGO_TARGET_DIR", target);
+    succeed(&mut cargo)
 }
 
 /// Unpacks every package, and returns the names of the crates with their folders.

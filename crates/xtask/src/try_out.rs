@@ -54,7 +54,17 @@ pub fn try_out(workspace: &Workspace) -> Result<()> {
     lend(&target(workspace).join(BUILT), &workspace.root().join(BUILD).join("debug"))?;
     let packages: Vec<String> =
         names.iter().flat_map(|name| ["-p".to_owned(), format!("tagalong-{name}")]).collect();
-    let cargo = |step: &str, args: &[&str], packages: &[String]| -> Result<()> {
+    // The program would be built for this alone; an example of the pipeline has the same plugins.
+    let mut build_configs = EXAMPLE.to_vec();
+    let configs: Vec<String> = names.iter().map(|name| format!("configs/{name}.toml")).collect();
+    build_configs.extend(configs.iter().map(String::as_str));
+    let clippy = ["clippy", "--quiet", "--all-targets", "--", "-D", "warnings"];
+    for (step, args, packages) in [
+        ("the generated crates are formatted", &["fmt", "--", "--check"][..], &packages[..]),
+        ("they build without warnings", &clippy, &packages),
+        ("they conform, as their own tests say", &["test", "--quiet"], &packages),
+        ("their configs build pipelines", &build_configs, &[]),
+    ] {
         eprintln!("new-plugin --try: {step}");
         let mut cargo = Command::new("cargo");
         let (before, after) = match args.iter().position(|arg| *arg == "--") {
@@ -64,17 +74,8 @@ pub fn try_out(workspace: &Workspace) -> Result<()> {
         };
         cargo.args(before).args(packages).args(after);
         cargo.current_dir(copy.root()).env("CARGO_TARGET_DIR", workspace.root().join(BUILD));
-        succeed(&mut cargo)
-    };
-    cargo("the generated crates are formatted", &["fmt", "--", "--check"], &packages)?;
-    let clippy = ["clippy", "--quiet", "--all-targets", "--", "-D", "warnings"];
-    cargo("they build without warnings", &clippy, &packages)?;
-    cargo("they conform, as their own tests say", &["test", "--quiet"], &packages)?;
-    // The program would be built for this alone; an example of the pipeline has the same plugins.
-    let mut build_configs = EXAMPLE.to_vec();
-    let configs: Vec<String> = names.iter().map(|name| format!("configs/{name}.toml")).collect();
-    build_configs.extend(configs.iter().map(String::as_str));
-    cargo("their configs build pipelines", &build_configs, &[])?;
+        succeed(&mut cargo)?;
+    }
     eprintln!("new-plugin --try: all six kinds work, and so do the walk-throughs");
     Ok(())
 }

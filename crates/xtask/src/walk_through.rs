@@ -170,11 +170,11 @@ mod tests {
 
     #[test]
     fn a_page_that_does_not_fit_its_template_is_refused() {
-        let none = || std::iter::empty();
+        let mut none = std::iter::empty();
         let default = Edit::Default { file: "", from: "bias: 0.0", sentence: "by `" };
-        let changed = default.apply("Self { bias: 0.0 }", "by `even: 1.0`", &mut none());
+        let changed = default.apply("Self { bias: 0.0 }", "by `even: 1.0`", &mut none);
         assert_eq!(changed.unwrap(), "Self { even: 1.0 }");
-        assert_eq!(default.apply("Self {}", "by `even: 1.0`", &mut none()), None);
-        assert_eq!(Edit::Append { file: "" }.apply("a", "", &mut none()), None, "no block left");
+        assert_eq!(default.apply("Self {}", "by `even: 1.0`", &mut none), None);
+        assert_eq!(Edit::Append { file: "" }.apply("a", "", &mut none), None, "no block left");
     }
 }

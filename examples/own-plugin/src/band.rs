@@ -38,7 +38,7 @@ impl OwnBand {
     /// Returns the nearest point of each column within the band, in the robot frame.
     fn nearest(&self, depth: &DepthImage, camera: &Camera) -> Vec<Point3<f64>> {
         let [low, high] = self.0.band_m;
-        let column = |x: usize| {
+        let nearest = (0..depth.width()).filter_map(|x| {
             let points = (0..depth.height()).step_by(4).map(|y| {
                 let metres = depth.get(x as i64, y as i64).unwrap_or(f32::NAN);
                 camera.back_project(Point2::new(x as f64, y as f64), f64::from(metres))
@@ -46,8 +46,8 @@ impl OwnBand {
             // Points without a reading are NaN, and in no band.
             let inside = points.filter(|point| (low..high).contains(&point.z));
             inside.min_by(|a, b| a.xy().coords.norm().total_cmp(&b.xy().coords.norm()))
-        };
-        (0..depth.width()).filter_map(column).collect()
+        });
+        nearest.collect()
     }
 
     /// Returns the person that a segment of neighbouring columns shows.

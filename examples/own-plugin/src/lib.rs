@@ -64,11 +64,10 @@ impl Verifier for OwnContrast {
         if right <= left || bottom <= top {
             return Ok(0.0);
         }
-        let values =
-            || (top..bottom).flat_map(|y| &grey.row(y)[left..right]).map(|v| f64::from(*v));
+        let values = (top..bottom).flat_map(|y| &grey.row(y)[left..right]).map(|v| f64::from(*v));
         let count = ((right - left) * (bottom - top)) as f64;
-        let mean = values().sum::<f64>() / count;
-        let variance = values().map(|v| (v - mean).powi(2)).sum::<f64>() / count;
+        let mean = values.clone().sum::<f64>() / count;
+        let variance = values.map(|v| (v - mean).powi(2)).sum::<f64>() / count;
         // One image must not decide alone; the clamp also bounds the logarithm of zero contrast.
         Ok((variance.sqrt() / self.config.even_contrast).ln().clamp(-3.0, 3.0))
     }

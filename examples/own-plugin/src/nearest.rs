@@ -33,8 +33,8 @@ impl Associator for OwnNearest {
     fn associate(&mut self, tracks: &[Track], found: &[Detection], gate: &Gate) -> Associations {
         let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
         for (row, track) in tracks.iter().enumerate() {
-            let fits = |d: &Detection| gate.admits(track, d) && self.fits(track, d, gate);
-            let near = found.iter().enumerate().filter(|(_, detection)| fits(detection));
+            let near = found.iter().enumerate().filter(|(_, d)| gate.admits(track, d));
+            let near = near.filter(|(_, d)| self.fits(track, d, gate));
             pairs.extend(near.map(|(column, d)| (distance(track, d), row, column)));
         }
         // Ties are broken by index: the same input has to give the same answer.

@@ -1,9 +1,10 @@
 //! Results that go out, for programs and for viewers.
 
 use ros2_client::Publisher;
+use serde::Serialize;
 use tagalong::core::{Frame, Stamp};
 use tagalong::log::msgs::{
-    Detection3DArray, Header, MarkerArray, People, PoseStamped, StringMsg, TFMessage,
+    Detection3DArray, Header, MarkerArray, Message, People, PoseStamped, StringMsg, TFMessage,
 };
 use tagalong::log::write::{self, FrameRecord, Trails};
 use tagalong::pipeline::FrameReport;
@@ -30,23 +31,22 @@ pub(super) struct Out {
 impl Out {
     /// Creates the publishers that the options ask for.
     pub(super) fn new(options: &Options, network: &mut Network) -> Result<Self, BridgeError> {
-        let named = |topic: &str| (!topic.is_empty()).then(|| topic.to_owned());
+        let forecast = match options.forecast.as_str() {
+            "" => None,
+            topic => {
+                let grid = network.kept_publisher(topic, "nav_msgs/msg/OccupancyGrid")?;
+                Some((grid, Forecast::new(options.forecast_settings())))
+            }
+        };
         Ok(Self {
             tracks: network.publisher(&options.tracks)?,
             target: network.publisher(&options.target)?,
             state: network.publisher(&options.state)?,
             heartbeat: network.publisher_of(&options.heartbeat, "std_msgs/msg/Header")?,
-            people: named(&options.people).map(|topic| network.publisher(&topic)).transpose()?,
-            forecast: named(&options.forecast)
-                .map(|topic| {
-                    let grid = network.kept_publisher(&topic, "nav_msgs/msg/OccupancyGrid")?;
-                    Ok::<_, BridgeError>((grid, Forecast::new(options.forecast_settings())))
-                })
-                .transpose()?,
-            transforms: named(&options.transforms)
-                .map(|topic| network.publisher(&topic))
-                .transpose()?,
-            markers: named(&options.markers).map(|topic| network.publisher(&topic)).transpose()?,
+            people: publisher_if_named(network, &options.people)?,
+            forecast,
+            transforms: publisher_if_named(network, &options.transforms)?,
+            markers: publisher_if_named(network, &options.markers)?,
             trails: Trails::default(),
             drawn: None,
         })
@@ -113,6 +113,17 @@ impl Out {
             let _lost = publisher.publish(write::no_markers(*at, world));
         }
     }
+}
+
+/// A publisher of a topic; none where the topic has no name.
+fn publisher_if_named<M: Message + Serialize>(
+    network: &mut Network,
+    topic: &str,
+) -> Result<Option<Publisher<M>>, BridgeError> {
+    if topic.is_empty() {
+        return Ok(None);
+    }
+    network.publisher(topic).map(Some)
 }
 
 #[cfg(test)]

@@ -68,11 +68,10 @@ pub(super) fn drive(
         let clock = Arc::clone(&clock);
         move || clock.now()
     };
-    let tell = move |wheels| {
+    Wheels::start(Duration::from_secs_f64(1.0 / options.rate), switch, now, move |wheels| {
         let header = Header::new(clock.now(), base_frame.as_str());
         publish(TwistStamped { header, twist: twist(wheels, half_m) });
-    };
-    Wheels::start(Duration::from_secs_f64(1.0 / options.rate), switch, now, tell)
+    })
 }
 
 /// Returns a function that publishes commands as the type that the options name.

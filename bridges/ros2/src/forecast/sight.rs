@@ -95,17 +95,23 @@ mod tests {
     #[test]
     fn a_camera_sees_what_is_in_its_image_and_not_behind_a_surface() {
         let wall = DepthImage::filled(160, 120, 3.0);
-        let seen = |frame: &Frame, x, y| Sight::new(frame).sees(&Point2::new(x, y));
         let before = frame_at(0.0, Some(wall.clone()));
-        assert!(seen(&before, 2.0, 0.0) && seen(&before, 3.3, 0.0));
-        assert!(!seen(&before, 3.5, 0.0), "behind the wall");
-        assert!(!seen(&before, -2.0, 0.0), "behind the camera");
-        assert!(seen(&before, 2.0, 1.9) && !seen(&before, 2.0, 2.1), "beside the image");
+        assert!(sees_place(&before, 2.0, 0.0) && sees_place(&before, 3.3, 0.0));
+        assert!(!sees_place(&before, 3.5, 0.0), "behind the wall");
+        assert!(!sees_place(&before, -2.0, 0.0), "behind the camera");
+        assert!(sees_place(&before, 2.0, 1.9), "within the image");
+        assert!(!sees_place(&before, 2.0, 2.1), "beside the image");
         let mut dark = wall;
         dark.pixels_mut().fill(f32::NAN);
-        assert!(!seen(&frame_at(0.0, Some(dark)), 2.0, 0.0), "no reading says nothing");
+        assert!(!sees_place(&frame_at(0.0, Some(dark)), 2.0, 0.0), "no reading says nothing");
         let blind = frame_at(0.0, None);
-        assert!(seen(&blind, 9.0, 0.0) && !seen(&blind, 11.0, 0.0), "without depth");
+        assert!(sees_place(&blind, 9.0, 0.0), "without depth");
+        assert!(!sees_place(&blind, 11.0, 0.0), "without depth, too far");
+    }
+
+    /// Whether a place is in sight in a frame.
+    fn sees_place(frame: &Frame, x: f64, y: f64) -> bool {
+        Sight::new(frame).sees(&Point2::new(x, y))
     }
 
     #[test]
@@ -124,9 +130,16 @@ mod tests {
         let motion = EgoMotion::at_rest(0.1);
         let frame = Frame::new(1, Stamp::default(), camera, motion, Images::default());
         let frame = frame.with_laser(Some(scan));
-        let seen = |x, y| Sight::new(&frame).sees(&Point2::new(x, y));
-        assert!(seen(0.0, -1.0) && seen(0.0, -2.3) && !seen(0.0, -2.5));
-        assert!(seen(5.0, 0.1) && !seen(FAR_M + 1.0, 0.0));
-        assert!(!seen(1.0, 1.0) && !seen(-1.0, 0.0));
+        for (x, y, is_seen) in [
+            (0.0, -1.0, true),
+            (0.0, -2.3, true),
+            (0.0, -2.5, false),
+            (5.0, 0.1, true),
+            (FAR_M + 1.0, 0.0, false),
+            (1.0, 1.0, false),
+            (-1.0, 0.0, false),
+        ] {
+            assert_eq!(sees_place(&frame, x, y), is_seen, "{x} {y}");
+        }
     }
 }

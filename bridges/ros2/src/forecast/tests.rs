@@ -78,13 +78,14 @@ fn a_walk_is_forecast_along_its_direction_the_later_the_less_until_the_horizon()
     let tracks = [person([1.0, 0.0], [1.0, 0.0], [0.02, 0.0])];
     let settings = ForecastSettings { horizon_s: 3.0, ..SETTINGS };
     let grid = made(&settings, &tracks, Isometry2::identity());
-    let after = |seconds: f64| value(&grid, 1.05 + seconds, 0.05);
     // A certain walk loses by its time alone: half each two seconds, from the moment a step before, in
     // which the person comes near.
     for (seconds, percent) in [(0.0, 100), (1.0, 76), (2.0, 54), (3.0, 38)] {
-        assert!((after(seconds) - percent).abs() <= 1, "{seconds} s: {}", after(seconds));
+        let after = value(&grid, 1.05 + seconds, 0.05);
+        assert!((after - percent).abs() <= 1, "{seconds} s: {after}");
     }
-    assert_eq!((after(4.0), value(&grid, 0.05, 0.05)), (0, 0), "after the horizon, and behind");
+    assert_eq!(value(&grid, 1.05 + 4.0, 0.05), 0, "after the horizon");
+    assert_eq!(value(&grid, 0.05, 0.05), 0, "behind");
 }
 
 #[test]
@@ -93,17 +94,16 @@ fn uncertain_velocity_spreads_with_time() {
         made(&SETTINGS, &[person([0.5, 0.0], [1.0, 0.0], [0.1, 0.0])], Isometry2::identity());
     let uncertain =
         made(&SETTINGS, &[person([0.5, 0.0], [1.0, 0.0], [0.1, 0.4])], Isometry2::identity());
-    let beside = |grid: &OccupancyGrid| value(grid, 3.55, 1.05);
-    assert_eq!(beside(&certain), 0);
-    assert!(beside(&uncertain) >= 2, "{}", beside(&uncertain));
+    let beside = [&certain, &uncertain].map(|grid| value(grid, 3.55, 1.05));
+    assert!(beside[0] == 0 && beside[1] >= 2, "{beside:?}");
     assert!(value(&uncertain, 3.55, 0.05) + 20 < value(&certain, 3.55, 0.05));
     // A person on the left that walks to the left is farther to the left later: more spread.
-    let coupled = |covariance| {
+    let coupled = [-0.1, 0.0, 0.1].map(|covariance| {
         let mut track = person([0.5, 0.0], [1.0, 0.0], [0.3, 0.4]);
         couple(&mut track, [1, 4], covariance);
         value(&made(&SETTINGS, &[track], Isometry2::identity()), 1.55, 0.05)
-    };
-    assert!(coupled(-0.1) > coupled(0.0) && coupled(0.0) > coupled(0.1));
+    });
+    assert!(coupled[0] > coupled[1] && coupled[1] > coupled[2], "{coupled:?}");
 }
 
 /// The sum over all cells is the area of the disc around the person, whatever the uncertainty.

@@ -165,18 +165,19 @@ mod tests {
 
     #[test]
     fn each_transition_ends_where_its_ending_says() {
-        let goals = |state: NodeState| {
-            [Ending::Success, Ending::Failure, Ending::Error]
-                .map(|ending| state.ended(ending).map(|transition| transition.goal))
-        };
-        let of = |states: [NodeState; 3]| states.map(Some);
-        assert_eq!(goals(CONFIGURING), of([INACTIVE, UNCONFIGURED, ERROR_PROCESSING]));
-        assert_eq!(goals(ACTIVATING), of([ACTIVE, INACTIVE, ERROR_PROCESSING]));
-        assert_eq!(goals(DEACTIVATING), of([INACTIVE, ACTIVE, ERROR_PROCESSING]));
-        assert_eq!(goals(CLEANING_UP), of([UNCONFIGURED, INACTIVE, ERROR_PROCESSING]));
-        assert_eq!(goals(SHUTTING_DOWN), of([FINALIZED, FINALIZED, ERROR_PROCESSING]));
-        assert_eq!(goals(ERROR_PROCESSING), of([UNCONFIGURED, FINALIZED, FINALIZED]));
-        assert_eq!(goals(ACTIVE), [None; 3]);
+        for (state, goals) in [
+            (CONFIGURING, Some([INACTIVE, UNCONFIGURED, ERROR_PROCESSING])),
+            (ACTIVATING, Some([ACTIVE, INACTIVE, ERROR_PROCESSING])),
+            (DEACTIVATING, Some([INACTIVE, ACTIVE, ERROR_PROCESSING])),
+            (CLEANING_UP, Some([UNCONFIGURED, INACTIVE, ERROR_PROCESSING])),
+            (SHUTTING_DOWN, Some([FINALIZED, FINALIZED, ERROR_PROCESSING])),
+            (ERROR_PROCESSING, Some([UNCONFIGURED, FINALIZED, FINALIZED])),
+            (ACTIVE, None),
+        ] {
+            let ended = [Ending::Success, Ending::Failure, Ending::Error]
+                .map(|ending| state.ended(ending).map(|transition| transition.goal));
+            assert_eq!(ended, goals.map_or([None; 3], |goals| goals.map(Some)), "{state:?}");
+        }
     }
 
     #[test]

@@ -76,8 +76,7 @@ fn images_become_tracks_and_commands_and_silence_becomes_zero() {
     assert!(states.iter().any(|(_, state)| state.data.contains("locked")), "{states:?}");
 
     assert!(commands.iter().all(|(_, c)| speeds(c).iter().all(|v| v.is_finite())));
-    let moves = |command: &TwistStamped| speeds(command) != [0.0, 0.0];
-    let moving = commands.iter().filter(|(_, command)| moves(command));
+    let moving = commands.iter().filter(|(_, command)| speeds(command) != [0.0, 0.0]);
     let last_move = moving.clone().map(|(at, _)| *at).max().expect("the robot is told to move");
     assert!(moving.count() > 20);
     let after_s = last_move.saturating_duration_since(last_image).as_secs_f64();
@@ -89,7 +88,7 @@ fn images_become_tracks_and_commands_and_silence_becomes_zero() {
     let silent_s = (stopped - *zeros.last().unwrap()).as_secs_f64();
     assert!(silent_s > 0.3, "zeros cease so that others may drive: {silent_s} s");
     let farewell = commands.last().unwrap();
-    assert!(farewell.0 > stopped && !moves(&farewell.1), "the last command is zero");
+    assert!(farewell.0 > stopped && speeds(&farewell.1) == [0.0, 0.0], "the last command is zero");
 }
 
 /// Checks what viewers and planners are told about the one person of the scene.
@@ -326,13 +325,9 @@ fn a_stuck_pipeline_stands_and_rivals_and_malformed_messages_are_told() {
     assert!(code == 503 && health.contains("one frame takes "), "{code} {health}");
     sleep(Duration::from_millis(1500));
     assert!(!commands.moves_since(expired), "stuck");
-    let stuck = |message: &DiagnosticStatus| {
-        message.level == 2 && message.message.contains("one frame takes")
-    };
-    let statuses = |told: &Collected<DiagnosticArray>| -> Vec<DiagnosticStatus> {
-        told.so_far().into_iter().flat_map(|(_, array)| array.status).collect()
-    };
-    assert!(statuses(&told).iter().any(stuck), "{:?}", statuses(&told));
+    let statuses = statuses_of(&told);
+    let mut errors = statuses.iter().filter(|status| status.level == 2);
+    assert!(errors.any(|status| status.message.contains("one frame takes")), "{statuses:?}");
     commands.wait_for_move("no longer stuck");
 
     junk.publish(7).unwrap();
@@ -340,12 +335,12 @@ fn a_stuck_pipeline_stands_and_rivals_and_malformed_messages_are_told() {
     let _rival = rival.publisher::<TwistStamped>("/cmd_vel", reliable());
     wait_for(&said, "1 other publishers of commands on cmd_vel");
     sleep(Duration::from_millis(1500));
-    let last = statuses(&told).pop().unwrap();
+    let last = statuses_of(&told).pop().unwrap();
     assert_eq!((last.level, last.name.as_str()), (1, "tagalong: follow"));
-    let value =
-        |key: &str| last.values.iter().find(|(name, _)| name == key).map(|(_, v)| v.clone());
-    assert_eq!(value("other publishers of commands").as_deref(), Some("1"), "{last:?}");
-    assert_eq!(value("malformed messages").as_deref(), Some("1"), "{last:?}");
+    for key in ["other publishers of commands", "malformed messages"] {
+        let value = last.values.iter().find(|(name, _)| name == key).map(|(_, v)| v.as_str());
+        assert_eq!(value, Some("1"), "{key}: {last:?}");
+    }
     assert!(beats.so_far().len() > 20);
 
     stop.store(true, Ordering::Relaxed);
@@ -356,6 +351,11 @@ fn a_stuck_pipeline_stands_and_rivals_and_malformed_messages_are_told() {
     assert!(drawn.finish().is_empty(), "no topic, no markers");
     drop(playing.join().unwrap());
     std::fs::remove_file(config).unwrap();
+}
+
+/// All statuses that were told so far.
+fn statuses_of(told: &Collected<DiagnosticArray>) -> Vec<DiagnosticStatus> {
+    told.so_far().into_iter().flat_map(|(_, array)| array.status).collect()
 }
 
 #[test]

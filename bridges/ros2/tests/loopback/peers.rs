@@ -405,7 +405,6 @@ impl Robot {
     ) -> Instant {
         self.fixed.publish(self.mount()).unwrap();
         let start = Instant::now();
-        let at = |ns| sleep((start + Duration::from_nanos(ns)) - Instant::now());
         let mut last = start;
         let mut repeated: Option<Shot> = None;
         while let Some(event) = simulation.next_event() {
@@ -414,11 +413,11 @@ impl Robot {
             }
             match event {
                 Event::Odometry(reading) => {
-                    at(reading.at_ns);
+                    sleep(start + Duration::from_nanos(reading.at_ns) - Instant::now());
                     self.odometry.publish(self.odometry(&reading)).unwrap();
                 }
                 Event::Shot(shot) => {
-                    at(shot.captured_ns);
+                    sleep(start + Duration::from_nanos(shot.captured_ns) - Instant::now());
                     let repeats = *self.repeats.lock().unwrap();
                     match repeated.as_mut().filter(|_| repeats != Repeats::Nothing) {
                         Some(shown) if repeats == Repeats::Images => self.shoot(shown),

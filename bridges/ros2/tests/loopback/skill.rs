@@ -143,12 +143,10 @@ fn a_person_is_enrolled_and_cleared_by_services_and_over_http() {
     let hand = Hand::new(domain(7), &stop);
     let mut caller = Peer::join(domain(7), "caller");
     let trigger = TriggerRequest { byte: 0 };
-    let of = |caller: &mut Peer, service: &str| {
-        client::<TriggerRequest, TriggerResponse>(caller, service, "std_srvs", "Trigger")
-    };
-    let status = of(&mut caller, "/people/status");
-    let clear = of(&mut caller, "/people/clear");
-    let nearest = of(&mut caller, "/people/enroll_nearest");
+    let triggers = ["/people/status", "/people/clear", "/people/enroll_nearest"];
+    let [status, clear, nearest] = triggers.map(|service| {
+        client::<TriggerRequest, TriggerResponse>(&mut caller, service, "std_srvs", "Trigger")
+    });
     let enroll = client::<SetParametersRequest, SetParametersResponse>(
         &mut caller,
         "/people/enroll",
@@ -183,9 +181,8 @@ fn a_person_is_enrolled_and_cleared_by_services_and_over_http() {
     assert_eq!(http(&address, "POST", "enroll", &body).0, 200, "{body}");
     commands.wait_for_move("the person of a track is followed");
 
-    let slow =
-        |speed_limit| SpeedLimit { header: Header::default(), percentage: false, speed_limit };
-    limit.publish(slow(0.05)).unwrap();
+    let slow = SpeedLimit { header: Header::default(), percentage: false, speed_limit: 0.05 };
+    limit.publish(slow).unwrap();
     wait_for(&said, "speed limit: 0.05 m/s");
     sleep(Duration::from_millis(2000));
     let limited = Instant::now();

@@ -58,26 +58,31 @@ pub fn assemble(
 /// quantity are left out, as are people without a box where boxes are compared; `None` if the truth
 /// lacks positions, or has no boxes at all.
 pub fn comparable(sequence: &Sequence, similarity: Similarity) -> Option<Sequence> {
-    let has_truth = |truth: &Truth| match similarity {
-        Similarity::Iou => truth.region.is_some(),
-        Similarity::Metres => truth.floor_m.is_some(),
-    };
-    let has_report = |report: &Report| match similarity {
-        Similarity::Iou => report.region.is_some(),
-        Similarity::Metres => report.floor_m.is_some(),
-    };
     let mut truths = sequence.frames.iter().flat_map(|frame| &frame.truths);
     let is_comparable = match similarity {
         // Without people in the truth every report is a false positive: still comparable.
-        Similarity::Iou => truths.clone().next().is_none() || truths.any(has_truth),
-        Similarity::Metres => truths.all(has_truth),
+        Similarity::Iou => {
+            truths.clone().next().is_none() || truths.any(|truth| has_place(truth, similarity))
+        }
+        Similarity::Metres => truths.all(|truth| has_place(truth, similarity)),
     };
     let mut kept = sequence.clone();
     for frame in &mut kept.frames {
-        frame.truths.retain(has_truth);
-        frame.reports.retain(has_report);
+        frame.truths.retain(|truth| has_place(truth, similarity));
+        frame.reports.retain(|report| match similarity {
+            Similarity::Iou => report.region.is_some(),
+            Similarity::Metres => report.floor_m.is_some(),
+        });
     }
     is_comparable.then_some(kept)
+}
+
+/// Whether a person of the truth has the box or the place that is compared.
+fn has_place(truth: &Truth, similarity: Similarity) -> bool {
+    match similarity {
+        Similarity::Iou => truth.region.is_some(),
+        Similarity::Metres => truth.floor_m.is_some(),
+    }
 }
 
 /// Returns the sentence of an error of a truth or of tracks, with the option that cures it.

@@ -138,8 +138,8 @@ mod tests {
         if !info.is_empty() {
             std::fs::write(folder.path().join("seqinfo.ini"), info).unwrap();
         }
-        let row = |frame: u32| format!("{frame},1,{x},10,40,90,1,-1,-1,-1\n");
-        std::fs::write(&path, row(1) + &row(last)).unwrap();
+        let rows = [1, last].map(|frame| format!("{frame},1,{x},10,40,90,1,-1,-1,-1\n"));
+        std::fs::write(&path, rows.concat()).unwrap();
         let truth = TruthFile::read(&path, TruthOptions::default()).unwrap();
         other_log_notes(&path, &truth, log, &shots())
     }
@@ -175,24 +175,27 @@ mod tests {
 
     #[test]
     fn stamps_that_no_image_has_are_told() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("walk.truth.jsonl");
-        fn frame(stamp_ns: u64) -> String {
-            let frame = tagalong_log::TruthFrame { stamp_ns, ..Default::default() };
-            serde_json::to_string(&frame).unwrap() + "\n"
-        }
-        let told = |stamps: &[u64]| {
-            let text: String = stamps.iter().map(|stamp| frame(*stamp)).collect();
-            std::fs::write(&path, text).unwrap();
-            let truth = TruthFile::read(&path, TruthOptions::default()).unwrap();
-            let notes = other_log_notes(&path, &truth, Some("walk.mcap"), &shots());
-            assert_eq!(notes.len(), 1, "{notes:?}");
-            notes[0].clone()
-        };
-        let other = told(&[100_000_000, 900_000_000_000, 901_000_000_000]);
+        let other = note_of_stamps(&[100_000_000, 900_000_000_000, 901_000_000_000]);
         assert!(other.contains("2 of 3 moments have no image"), "{other}");
         assert!(other.ends_with("the comparison means nothing"), "{other}");
-        let lost = told(&[100_000_000, 200_000_000, 901_000_000_000]);
+        let lost = note_of_stamps(&[100_000_000, 200_000_000, 901_000_000_000]);
         assert!(lost.ends_with("1 moments have no image and are left out"), "{lost}");
+    }
+
+    /// The one note on a truth whose moments have these stamps.
+    fn note_of_stamps(stamps: &[u64]) -> String {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("walk.truth.jsonl");
+        let mut text = String::new();
+        for &stamp_ns in stamps {
+            let frame = tagalong_log::TruthFrame { stamp_ns, ..Default::default() };
+            text += &serde_json::to_string(&frame).expect("a frame is JSON");
+            text.push('\n');
+        }
+        std::fs::write(&path, text).expect("the folder takes files");
+        let truth = TruthFile::read(&path, TruthOptions::default()).expect("a valid truth");
+        let notes = other_log_notes(&path, &truth, Some("walk.mcap"), &shots());
+        assert_eq!(notes.len(), 1, "{notes:?}");
+        notes[0].clone()
     }
 }

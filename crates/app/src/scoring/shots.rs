@@ -95,27 +95,28 @@ impl Shots {
 
     /// Returns the frame with the nearest stamp, if that is no farther away than `within_ns`.
     pub fn near(&self, stamp_ns: u64, within_ns: u64) -> Option<&Shot> {
-        let off = |shot: &&Shot| shot.stamp_ns.abs_diff(stamp_ns);
-        self.shots.iter().min_by_key(off).filter(|shot| off(shot) <= within_ns)
+        let nearest = self.shots.iter().min_by_key(|shot| shot.stamp_ns.abs_diff(stamp_ns))?;
+        (nearest.stamp_ns.abs_diff(stamp_ns) <= within_ns).then_some(nearest)
     }
 
     /// Returns the time of a frame since the first one, ns; frames that were not delivered are
     /// interpolated, and without a log all frames are spaced by `rate`.
     pub fn stamp_ns(&self, number: u32, rate: Rate) -> i64 {
-        let spaced = |frames: i64| (frames as f64 / rate.0 * 1e9).round() as i64;
         let after = self.shots.partition_point(|shot| shot.number < number);
-        let point = |index: usize| {
-            Some((i64::from(self.shots.get(index)?.number), *self.elapsed_ns.get(index)?))
-        };
-        let before = after.checked_sub(1).and_then(point);
+        let before = after.checked_sub(1).and_then(|index| self.number_and_time(index));
         let number = i64::from(number);
-        match (before, point(after)) {
+        match (before, self.number_and_time(after)) {
             (_, Some((at, elapsed))) if at == number => elapsed,
             (Some((a, from)), Some((b, to))) => from + (to - from) * (number - a) / (b - a),
             (Some((last, elapsed)), None) => elapsed + (number - last) * self.spacing_ns(),
             (None, Some((first, elapsed))) => elapsed - (first - number) * self.spacing_ns(),
-            (None, None) => spaced(number - 1),
+            (None, None) => ((number - 1) as f64 / rate.0 * 1e9).round() as i64,
         }
+    }
+
+    /// The number of a shot, and its time since the first one.
+    fn number_and_time(&self, index: usize) -> Option<(i64, i64)> {
+        Some((i64::from(self.shots.get(index)?.number), *self.elapsed_ns.get(index)?))
     }
 
     /// Returns the mean time between two images, ns.

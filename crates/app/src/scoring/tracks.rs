@@ -99,15 +99,11 @@ impl Tracks {
                 "{shown} is a folder of runs: name one of them, as `--tracks {first}`"
             )));
         }
-        let file = |name: &str| -> Result<(String, String), Failure> {
-            let path: PathBuf = folder.join(name);
-            Ok((read_text(&path)?, path.display().to_string()))
-        };
-        let (text, name) = file("tracks.csv")?;
+        let (text, name) = text_and_name(folder.join("tracks.csv"))?;
         let mut tracks = Self::of_boxes(&text, &name, length)?;
-        let (text, name) = file("tracks-metres.csv")?;
+        let (text, name) = text_and_name(folder.join("tracks-metres.csv"))?;
         merge(&mut tracks.reports, places(&text, &name, length)?);
-        let (text, name) = file("report.json")?;
+        let (text, name) = text_and_name(folder.join("report.json"))?;
         let facts: RunFacts = serde_json::from_str(&text)
             .map_err(|error| Failure::failed(format!("{name}: {error}")))?;
         if facts.ended != complete() {
@@ -119,6 +115,11 @@ impl Tracks {
         }
         Ok(Self { log_name: Some(facts.log.name), in_robot_frame: true, ..tracks })
     }
+}
+
+/// The text of a file, and the file's name for messages.
+fn text_and_name(path: PathBuf) -> Result<(String, String), Failure> {
+    Ok((read_text(&path)?, path.display().to_string()))
 }
 
 fn is_kitti(first: &str) -> bool {

@@ -104,14 +104,16 @@ impl TruthFile {
     /// # Errors
     /// A log without a file beside it that cannot be read.
     pub fn beside(log: &Path) -> Result<Option<(PathBuf, bool)>, Failure> {
-        let file = |ending: &str| Some(log.with_extension(ending)).filter(|path| path.is_file());
         // Files beside the log take precedence, so that they can replace the log's own truth.
-        let people = file("people.csv").or_else(|| file("truth.jsonl"));
-        Ok(match (people, file("boxes.csv")) {
-            (Some(people), _) => Some((people, false)),
-            (None, Some(boxes)) => Some((boxes, true)),
-            (None, None) => read_truth(log, &Limits::default())?.map(|_| (log.to_owned(), false)),
-        })
+        for (ending, has_boxes) in
+            [("people.csv", false), ("truth.jsonl", false), ("boxes.csv", true)]
+        {
+            let file = log.with_extension(ending);
+            if file.is_file() {
+                return Ok(Some((file, has_boxes)));
+            }
+        }
+        Ok(read_truth(log, &Limits::default())?.map(|_| (log.to_owned(), false)))
     }
 
     /// Reads truth of any format.
@@ -540,37 +542,41 @@ mod tests {
 
     #[test]
     fn truth_that_ends_far_before_its_frames_is_told() {
-        let info = |length| SequenceInfo { length, ..SequenceInfo::default() };
         for (last, length, is_told) in
             [(20, 600, true), (590, 600, false), (1, 9, false), (85, 100, false)]
         {
             let mut file = TruthFile::empty(Kind::Mot);
             (1..=last)
                 .for_each(|number| file.add(number, Truth::default(), TruthPosition::Unknown));
-            file.info = Some(info(length));
+            file.info = Some(SequenceInfo { length, ..SequenceInfo::default() });
             let note = file.early_end("gt.txt", &Shots::default());
             assert_eq!(note.is_some(), is_told, "{last} of {length}: {note:?}");
         }
-        let nobody = TruthFile { info: Some(info(600)), ..TruthFile::empty(Kind::Mot) };
+        let mut nobody = TruthFile::empty(Kind::Mot);
+        nobody.info = Some(SequenceInfo { length: 600, ..SequenceInfo::default() });
         assert_eq!(nobody.early_end("gt.txt", &Shots::default()), None);
     }
 
     #[test]
     fn the_first_of_doubled_ids_is_kept_and_the_others_are_counted() {
         let mut file = TruthFile::empty(Kind::Mot);
-        let person = |id, x| Truth {
-            id,
-            region: Some(Region { x, y: 0.0, width: 3.0, height: 4.0 }),
-            ..Truth::default()
-        };
         for (number, id, x) in [(1, 5, 1.0), (1, 5, 2.0), (1, 6, 3.0), (2, 5, 4.0)] {
-            file.add(number, person(id, x), TruthPosition::Unknown);
+            file.add(number, person_at(id, x), TruthPosition::Unknown);
         }
         file.drop_doubled_ids("gt.txt");
         let frames = file.frames(&Shots::default());
-        assert_eq!(frames[&1].0, [person(5, 1.0), person(6, 3.0)]);
+        assert_eq!(frames[&1].0, [person_at(5, 1.0), person_at(6, 3.0)]);
         assert_eq!(frames[&2].0.len(), 1);
         assert_eq!(file.notes, ["gt.txt: 1 people are left out, whose ID the frame has already"]);
+    }
+
+    /// A person with a small box at this column.
+    fn person_at(id: i64, x: f64) -> Truth {
+        Truth {
+            id,
+            region: Some(Region { x, y: 0.0, width: 3.0, height: 4.0 }),
+            ..Truth::default()
+        }
     }
 
     #[test]

@@ -126,30 +126,27 @@ pub fn boxes(args: &BoxesArgs, registry: &Registry) -> Outcome {
         drop_doubled_ids(&mut sequences);
     }
     let bench = Bench { args, registry, sequences: &sequences, places: places(&sequences) };
-    let mut rows = Vec::new();
     let mut notes = Vec::new();
     let mut details = Vec::new();
     for contestant in &contestants {
-        let mut add = |name: String, tracked: Vec<Tracked>| -> Result<(), Failure> {
-            bench.write(&name, &tracked)?;
-            rows.push(Row::ours(&name, cells(&tracked)));
-            details.push((name, tracked));
-            Ok(())
-        };
         let shipped = vec![contestant.shipped; sequences.len()];
-        add(contestant.name.clone(), bench.track(contestant, &shipped)?)?;
+        let tracked = bench.track(contestant, &shipped)?;
+        details.push(bench.keep_tracks(contestant.name.clone(), tracked)?);
         if args.leave_one_out {
             let (choice, figures) = bench.choose(contestant)?;
             let without: Vec<usize> =
                 bench.places.iter().map(|place| choice.without[*place]).collect();
-            add(format!("{}-left-out", contestant.name), bench.track(contestant, &without)?)?;
+            let tracked = bench.track(contestant, &without)?;
+            details.push(bench.keep_tracks(format!("{}-left-out", contestant.name), tracked)?);
             let with_all = vec![choice.with_all; sequences.len()];
-            add(format!("{}-with-all", contestant.name), bench.track(contestant, &with_all)?)?;
+            let tracked = bench.track(contestant, &with_all)?;
+            details.push(bench.keep_tracks(format!("{}-with-all", contestant.name), tracked)?);
             notes.push(format!("{}: {figures} settings tried.", contestant.name));
             notes.extend(bench.words(contestant, &choice));
         }
     }
     let title = format!("Given boxes, {} sequences", sequences.len());
+    let rows = details.iter().map(|(name, tracked)| Row::ours(name, cells(tracked))).collect();
     let columns = COLUMNS.map(String::from).to_vec();
     let summary = Table { title, columns, rows, notes };
     show(&[summary, bench.details(&details)], args.format)?;
@@ -222,15 +219,21 @@ impl Bench<'_> {
         words
     }
 
-    fn write(&self, name: &str, tracked: &[Tracked]) -> Result<(), Failure> {
-        let Some(folder) = &self.args.output else { return Ok(()) };
-        let folder = folder.join(name);
-        make_folder(&folder)?;
-        for (sequence, tracked) in self.sequences.iter().zip(tracked) {
-            let path = folder.join(format!("{}.txt", sequence.info.name));
-            write_file(&path, tracked.tracks.text())?;
+    /// Writes the tracks of a pipeline, where that is asked for, and keeps them with its name.
+    fn keep_tracks(
+        &self,
+        name: String,
+        tracked: Vec<Tracked>,
+    ) -> Result<(String, Vec<Tracked>), Failure> {
+        if let Some(folder) = &self.args.output {
+            let folder = folder.join(&name);
+            make_folder(&folder)?;
+            for (sequence, tracked) in self.sequences.iter().zip(&tracked) {
+                let path = folder.join(format!("{}.txt", sequence.info.name));
+                write_file(&path, tracked.tracks.text())?;
+            }
         }
-        Ok(())
+        Ok((name, tracked))
     }
 
     /// Returns HOTA and IDF1 by sequence.

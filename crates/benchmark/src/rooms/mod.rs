@@ -17,7 +17,7 @@ use tagalong_app::format::TableFormat;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
 use tagalong_app::scoring::read_text;
 use tagalong_app::suggest::check_log_path;
-use tagalong_config::Registry;
+use tagalong_config::{ConfigError, Registry};
 use tagalong_math::counted;
 use work::Desk;
 
@@ -57,18 +57,17 @@ fn locations(args: &RoomsArgs) -> Result<Vec<Location>, Failure> {
     let shown = path.display().to_string();
     let text = read_text(path).map_err(|failure| Failure::usage(failure.message))?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let at = |error: tagalong_config::ConfigError| Failure::usage(error.render(&shown, &text));
-    let rooms = Rooms::parse(&text, folder, args.logs_dir.as_deref()).map_err(at)?;
+    let rooms = Rooms::parse(&text, folder, args.logs_dir.as_deref())
+        .map_err(|error| Failure::usage(error.render(&shown, &text)))?;
     let mut locations = Vec::new();
     for room in rooms.rooms {
         let mut logs = Vec::new();
         for log in &room.logs {
-            let here = |failure: Failure| {
-                let span = Some(log.place.clone());
-                at(tagalong_config::ConfigError::new(failure.message).or_at(span))
-            };
-            check_log_path(&log.path).map_err(here)?;
-            let annotated = plan::with_truth(&log.path).map_err(here)?;
+            let annotated = check_log_path(&log.path).and_then(|()| plan::with_truth(&log.path));
+            let annotated = annotated.map_err(|failure| {
+                let error = ConfigError::new(failure.message).or_at(Some(log.place.clone()));
+                Failure::usage(error.render(&shown, &text))
+            })?;
             logs.push(plan::Annotated { unjudged: room.unjudged(log).to_vec(), ..annotated });
         }
         let models = room.models.into_iter().map(|(plugin, model)| {
@@ -77,7 +76,8 @@ fn locations(args: &RoomsArgs) -> Result<Vec<Location>, Failure> {
                 return Ok((plugin, path));
             }
             let message = format!("there is no model {}", model.path.display());
-            Err(at(tagalong_config::ConfigError::new(message).or_at(Some(model.place))))
+            let error = ConfigError::new(message).or_at(Some(model.place));
+            Err(Failure::usage(error.render(&shown, &text)))
         });
         let models = models.collect::<Result<_, Failure>>()?;
         locations.push(Location {

@@ -441,10 +441,14 @@ fn columns() -> impl Iterator<Item = String> {
 
 fn cells(room: &InRoom) -> Vec<Cell> {
     let InRoom { without, with_all, shipped, .. } = room;
-    let all = |figure: fn(&Figures) -> f64| [without, with_all, shipped].map(figure);
-    let [hota, hota_all, hota_shipped] = all(|f| f.hota);
-    let first = [hota, hota_all, hota_all - hota, hota_shipped];
-    let others = [all(|f| f.idf1), all(|f| f.mota), all(|f| f.false_a_frame), all(|f| f.recall)];
+    let first = [without.hota, with_all.hota, with_all.hota - without.hota, shipped.hota];
+    let all: [&Figures; 3] = [without, with_all, shipped];
+    let others = [
+        all.map(|f| f.idf1),
+        all.map(|f| f.mota),
+        all.map(|f| f.false_a_frame),
+        all.map(|f| f.recall),
+    ];
     let figures = first.into_iter().chain(others.into_iter().flatten());
     let shown =
         [without.recall_free, without.recall_partly_hidden, without.position_error_m].into_iter();

@@ -144,12 +144,13 @@ pub fn model(args: &ModelArgs, registry: &Registry) -> Outcome {
     }
     let size = args.size.as_deref().and_then(|size| <[usize; 2]>::try_from(size).ok());
     let shown = file.display();
-    let refused = |why: String| Failure::failed(format!("{shown}: {why}"));
     let limits = Limits::default();
-    let about = inspect(file, size, &limits).map_err(refused)?;
-    let known = known(file, &about, size, &limits);
+    let about =
+        inspect(file, size, &limits).map_err(|why| Failure::failed(format!("{shown}: {why}")))?;
+    let known = known(file, &about, size, &limits)
+        .map_err(|why| Failure::failed(format!("{shown}: {why}")));
     if args.install {
-        let known = known.map_err(refused)?;
+        let known = known?;
         return Install {
             file,
             name: args.name.as_deref(),
@@ -160,7 +161,7 @@ pub fn model(args: &ModelArgs, registry: &Registry) -> Outcome {
         .run();
     }
     if let Some(config) = &args.output {
-        let known = known.map_err(refused)?;
+        let known = known?;
         spare(config, args.overwrite)?;
         make_room_for(config)?;
         let name = relative_to(config, file)?;
@@ -175,7 +176,7 @@ pub fn model(args: &ModelArgs, registry: &Registry) -> Outcome {
         }
         Format::Json => to_json("the network", &as_json(&about, known.as_ref().ok()))?,
     })?;
-    known.map(|_| Ended::Well).map_err(refused)
+    known.map(|_| Ended::Well)
 }
 
 /// Returns the remedy for the name of a network in the place of its file; `None` for any other path.

@@ -58,15 +58,15 @@ fn a_check_with_a_log_tries_it() {
 fn a_check_warns_of_a_camera_that_the_config_is_not_for() {
     let home = tempfile::tempdir().unwrap();
     Drawn::of(3).write(&home.path().join("walk.mcap"));
-    let with = |height_m: f64| {
+    let [low, high] = [0.6, 1.2].map(|height_m| {
         let camera =
             format!("extends = 'follow-depth.toml'\n[input.camera]\nheight_m = {height_m}\n");
         fs::write(home.path().join("mine.toml"), camera).unwrap();
         answer(&["check", "mine.toml"], home.path())
-    };
+    });
     let warning = "the camera is 0.60 m high, and the config is for 0.9 to 2 m";
-    assert!(with(0.6).contains(warning), "{}", with(0.6));
-    assert!(!with(1.2).contains("the camera is"), "{}", with(1.2));
+    assert!(low.contains(warning), "{low}");
+    assert!(!high.contains("the camera is"), "{high}");
     config(home.path(), "[suits]\ncamera_height_m = [2.0, 3.0]\n");
     let told = answer(&["check", "nearest.toml", "walk.mcap"], home.path());
     assert!(told.contains("the camera is 1.20 m high"), "{told}");

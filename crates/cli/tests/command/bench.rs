@@ -44,6 +44,13 @@ impl Home {
         command.current_dir(self.folder.path()).arg("bench").args(arguments).output().unwrap()
     }
 
+    /// Plans with these arguments and returns the hashes of the tasks.
+    fn task_hashes(&self, out: &str, arguments: &[&str]) -> Vec<Value> {
+        ok(self
+            .bench(&[&["plan", "--logs", "logs/short.mcap", "-o", out][..], arguments].concat()));
+        self.plan(out).iter().map(|task| task["hash"].clone()).collect()
+    }
+
     fn plan(&self, out: &str) -> Vec<Value> {
         let text = fs::read_to_string(self.path(out).join("plan.jsonl")).unwrap();
         text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
@@ -287,20 +294,19 @@ fn a_pipeline_that_can_detect_nothing_is_skipped_with_the_reason_that_run_gives(
 #[test]
 fn a_hash_changes_with_what_matters_and_with_nothing_else() {
     let home = Home::new();
-    let plan = |out: &str| -> Vec<String> {
-        ok(home.bench(&["plan", "--logs", "logs/short.mcap", "-o", out]));
-        home.plan(out).iter().map(|task| task["hash"].as_str().unwrap().to_owned()).collect()
-    };
-    let first = plan("a");
+    let first = home.task_hashes("a", &[]);
     let path = home.path("configs/near.toml");
     let config = fs::read_to_string(&path).unwrap();
     fs::write(&path, format!("# a comment\n{config}")).unwrap();
-    assert_eq!(plan("b"), first, "a comment changes nothing");
+    assert_eq!(home.task_hashes("b", &[]), first, "a comment changes nothing");
     fs::write(&path, config.replace("seed = 7", "seed = 8")).unwrap();
-    let seeded = plan("c");
+    let seeded = home.task_hashes("c", &[]);
     assert_eq!((&seeded[0], seeded[1] != first[1]), (&first[0], true), "far, then near");
     fs::write(home.path("logs/short.people.csv"), crate::common::people(8)).unwrap();
-    assert!(plan("d").iter().zip(&seeded).all(|(new, old)| new != old), "other truth");
+    assert!(
+        home.task_hashes("d", &[]).iter().zip(&seeded).all(|(new, old)| new != old),
+        "other truth"
+    );
 }
 
 #[test]
@@ -309,15 +315,12 @@ fn files_that_a_config_names_belong_to_the_hash() {
     let config = "[[detectors]]\nplugin = \"recorded-detections\"\nroles = [\"discover\"]\n\
                   config = { path = \"../det.txt\" }\n[filter]\nplugin = \"ekf\"\n";
     fs::write(home.path("configs/boxes.toml"), config).unwrap();
-    let hash = |out: &str, boxes: &str| {
-        fs::write(home.path("det.txt"), boxes).unwrap();
-        let only = ["--logs", "logs/short.mcap", "--configs", "configs/boxes.toml"];
-        ok(home.bench(&[&["plan", "-o", out][..], &only].concat()));
-        home.plan(out)[0]["hash"].clone()
-    };
-    let first = hash("a", "1,-1,90,40,26,79,0.9\n");
-    assert_eq!(hash("b", "1,-1,90,40,26,79,0.9\n"), first);
-    assert_ne!(hash("c", "1,-1,90,40,26,79,0.8\n"), first);
+    let [first, same, other] = [("a", "0.9"), ("b", "0.9"), ("c", "0.8")].map(|(out, score)| {
+        fs::write(home.path("det.txt"), format!("1,-1,90,40,26,79,{score}\n")).unwrap();
+        home.task_hashes(out, &["--configs", "configs/boxes.toml"])
+    });
+    assert_eq!(same[0], first[0]);
+    assert_ne!(other[0], first[0]);
 }
 
 #[test]
@@ -427,14 +430,13 @@ fn trackeval_gets_its_tree() {
 #[test]
 fn copies_of_one_log_are_no_independent_logs() {
     let home = Home::new();
-    let alter = |log: &str, copy: &str| {
-        let mut command = own_plugin();
-        command.current_dir(home.folder.path()).args(["alter", log, "--mirror", "-o", copy]);
-        ok(command.output().unwrap());
-    };
-    alter("logs/short.mcap", "logs/mirrored.mcap");
     // A copy of a copy goes back to the same recording.
-    alter("logs/mirrored.mcap", "logs/twice.mcap");
+    for [log, copy] in [["short", "mirrored"], ["mirrored", "twice"]] {
+        let mut command = own_plugin();
+        let [log, copy] = [log, copy].map(|name| format!("logs/{name}.mcap"));
+        command.current_dir(home.folder.path()).args(["alter", &log, "--mirror", "-o", &copy]);
+        ok(command.output().unwrap());
+    }
     let done = home.bench(&["--logs-dir", "logs", "-o", "out"]);
     assert_eq!(code(&done), 0, "{}", text(&done.stderr));
     let told = text(&done.stdout);

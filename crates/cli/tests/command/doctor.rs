@@ -422,12 +422,10 @@ fn a_tracked_thing_and_an_untracked_person_are_criticised() {
 fn without_a_config_each_pipeline_that_fits_is_tried() {
     let home = tempfile::tempdir().unwrap();
     let folder = home.path().join("checkup");
-    let doctor = || {
-        let mut command = tagalong();
-        command.arg("doctor").arg(good()).env("TAGALONG_HOME", home.path());
-        command
-    };
-    let output = doctor().args(["--format", "json", "-o"]).arg(&folder).output().unwrap();
+    let mut doctor = tagalong();
+    doctor.arg("doctor").arg(good()).env("TAGALONG_HOME", home.path());
+    let printed = text(&doctor.output().unwrap().stdout);
+    let output = doctor.args(["--format", "json", "-o"]).arg(&folder).output().unwrap();
     let said: Value = serde_json::from_slice(&output.stdout).expect("a diagnosis");
     let rows = said["pipelines"].as_array().unwrap();
     let names: Vec<&str> = rows.iter().map(|row| row["config"].as_str().unwrap()).collect();
@@ -439,7 +437,6 @@ fn without_a_config_each_pipeline_that_fits_is_tried() {
         let pictures = std::fs::read_dir(folder.join(name)).unwrap().count();
         assert!(pictures >= 5, "{name}: {pictures} pictures");
     }
-    let printed = text(&doctor().output().unwrap().stdout);
     assert!(printed.contains("depth-verified (taken by `run`)"), "{printed}");
     assert!(printed.contains("`tagalong run` takes depth-verified, because"), "{printed}");
     let network = said["network"].as_str().unwrap();
@@ -537,18 +534,17 @@ fn images_that_make_no_frames_are_told() {
 #[test]
 fn a_camera_outside_of_the_stated_range_is_told() {
     let home = tempfile::tempdir().unwrap();
-    let stated = |range: &str| {
-        let path = home.path().join("stated.toml");
+    let path = home.path().join("stated.toml");
+    let [low, high] = ["[0.2, 0.6]", "[0.9, 2.4]"].map(|range| {
         let text = "[[detectors]]\nplugin = 'depth-template'\nroles = ['track', 'discover']\n\
                     [filter]\nplugin = 'ekf'\n[suits]\ncamera_height_m = ";
         std::fs::write(&path, format!("{text}{range}\n")).unwrap();
         let (_, said) = doctor(&path, good(), &["--settings", "never"]);
         finding(&said, "suits").clone()
-    };
-    let low = stated("[0.2, 0.6]");
+    });
     assert_eq!(low["severity"], "bad", "{low:#}");
     assert!(low["measured"].as_str().unwrap().starts_with("not for this camera: 1.20 m high"));
-    assert_eq!(stated("[0.9, 2.4]")["severity"], "ok");
+    assert_eq!(high["severity"], "ok");
 }
 
 #[test]

@@ -112,17 +112,17 @@ fn repairs_show_what_each_kind_of_error_costs() {
     let files = ["--truth", "walk.people.csv", "--tracks", "out", "--repairs"];
     let scores = json(&in_home(folder.path(), &[&files[..], &["--format", "json"]].concat()));
     let repairs = scores["repairs"].as_array().unwrap();
-    let hota = |name: &str| {
+    let [misses, identities, reports] = ["misses", "identities", "false-reports"].map(|name| {
         let row = repairs.iter().find(|row| row["repair"] == name);
         row.and_then(|row| row["HOTA"].as_f64()).unwrap_or_else(|| panic!("{name}: {scores}"))
-    };
+    });
     let as_is = scores["HOTA"].as_f64().unwrap();
-    assert!(as_is < 0.9 && hota("misses") > as_is + 0.1, "{scores}");
-    assert_eq!([hota("identities"), hota("false-reports")], [as_is; 2], "{scores}");
+    assert!(as_is < 0.9 && misses > as_is + 0.1, "{scores}");
+    assert_eq!([identities, reports], [as_is; 2], "{scores}");
     let printed = in_home(folder.path(), &files);
     let printed = text(&printed.stdout);
     let line = printed.lines().find(|line| line.starts_with("no misses")).unwrap();
-    assert!(line.contains(&format!("{:.4}", hota("misses"))), "{printed}");
+    assert!(line.contains(&format!("{misses:.4}")), "{printed}");
     assert!(!text(&in_home(folder.path(), &files[..4]).stdout).contains("no misses"));
 }
 
@@ -316,9 +316,11 @@ fn rules_odd_boxes_and_constant_scores_are_said() {
     assert_eq!((said["TP"].as_u64(), said["FP"].as_u64()), (Some(2), Some(1)), "{said}");
     assert_eq!(said["rules"].as_str(), Some("MOT17"));
     let notes = said["notes"].as_array().unwrap();
-    let has = |words: &str| notes.iter().any(|note| note.as_str().unwrap().contains(words));
-    assert!(has("1 of 3 boxes have no area (the first in line 3)"), "{notes:?}");
-    assert!(has("LAMR and AP mean nothing") && notes.len() == 2, "{notes:?}");
+    for words in ["1 of 3 boxes have no area (the first in line 3)", "LAMR and AP mean nothing"] {
+        let is_told = notes.iter().any(|note| note.as_str().unwrap().contains(words));
+        assert!(is_told, "{words} in {notes:?}");
+    }
+    assert_eq!(notes.len(), 2, "{notes:?}");
     let printed = scored(&truth_with("1"), &tracks, &[]);
     let printed = text(&printed.stdout);
     assert!(printed.contains("\nnote: tracks.txt: 1 of 3 boxes have no area"), "{printed}");

@@ -278,20 +278,19 @@ fn a_network_of_which_the_shape_does_not_tell_the_family_is_told_apart_or_refuse
     let Some(network) = field("network-family-by-shape/boxes-score-label.onnx") else { return };
     let Some(log) = field("fallback-reason-false/depth-mono16.mcap") else { return };
     let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/onnx.toml");
-    let config = |family: &str| {
-        format!(
+    let [found, named] = ["", ", family = \"yolov10\""].map(|family| {
+        let config = format!(
             "extends = \"{}\"\n[[detectors]]\nplugin = \"onnx\"\n\
              config = {{ model = \"{}\"{family} }}\n",
             shipped.display(),
             network.display()
-        )
-    };
-    let found = run(&config(""), &log, &[]);
+        );
+        run(&config, &log, &[])
+    });
     let is_refused = found.code == 2 && found.said.contains("yolov10");
     if !is_refused {
         has_the_box(&found);
     }
-    let named = run(&config(", family = \"yolov10\""), &log, &[]);
     assert_eq!(named.code, 0, "{}", named.said);
     has_the_box(&named);
 }

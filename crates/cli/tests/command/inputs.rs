@@ -65,10 +65,11 @@ impl Home {
         fs::write(self.path("config.toml"), config).unwrap();
         let (code, said) = self.tell(&["run", "config.toml", log, "-o", "out", "--overwrite"]);
         assert_eq!(code, 0, "{log}: {said}");
-        let read = |name: &str| fs::read_to_string(self.path("out").join(name)).unwrap();
-        let report: serde_json::Value = serde_json::from_str(&read("report.json")).unwrap();
+        let [report, boxes, places] = ["report.json", "tracks.csv", "tracks-metres.csv"]
+            .map(|name| fs::read_to_string(self.path("out").join(name)).unwrap());
+        let report: serde_json::Value = serde_json::from_str(&report).unwrap();
         let found = ["frames", "persons", "candidates", "funnel"].map(|key| report[key].clone());
-        [read("tracks.csv"), read("tracks-metres.csv"), format!("{found:?}")]
+        [boxes, places, format!("{found:?}")]
     }
 }
 
@@ -146,33 +147,29 @@ fn a_pipeline_that_requires_depth_is_refused_without() {
 #[test]
 fn check_says_what_is_needed_and_what_is_used() {
     let home = tempfile::tempdir().unwrap();
-    let said = |config: &str| {
-        fs::write(home.path().join("config.toml"), config).unwrap();
-        let output = tagalong().arg("check").arg(home.path().join("config.toml")).output().unwrap();
-        text(&output.stdout) + &text(&output.stderr)
-    };
-    let mono = said(&config("mono"));
-    assert!(mono.contains("valid; needs colour\n"), "{mono}");
-    let both = said(&config("rgbd-compressive"));
-    assert!(both.contains("needs colour; uses depth where the log has it"), "{both}");
-    let named = format!("{}[input]\ndepth_topic = \"/depth\"\n", config("rgbd-compressive"));
-    let named = said(&named);
-    assert!(named.contains("valid; needs colour and depth\n"), "a named topic: {named}");
-    let steered = config("follow-depth");
-    let plain = said(&steered);
-    assert!(
-        plain.contains("valid; needs depth and odometry; uses colour and laser where"),
-        "{plain}"
-    );
+    let path = home.path().join("config.toml");
     let bumper = "[[collision_monitor.sources]]\nname = \"hazards\"\ntype = \"bumper\"\n\
                   topic = \"/hazards\"\n";
-    let bumper = said(&format!("{steered}\n{bumper}"));
-    assert!(
-        bumper.contains("valid; needs depth and obstacle-sources and odometry; uses colour"),
-        "{bumper}"
-    );
-    let refused = said(&format!("without = [\"depth\"]\n{}", config("rgbd-ekf")));
-    assert!(refused.contains("`depth-template` requires depth images"), "{refused}");
+    let named_topic = format!("{}[input]\ndepth_topic = \"/depth\"\n", config("rgbd-compressive"));
+    for (config, words) in [
+        (config("mono"), "valid; needs colour\n"),
+        (config("rgbd-compressive"), "needs colour; uses depth where the log has it"),
+        (named_topic, "valid; needs colour and depth\n"),
+        (config("follow-depth"), "valid; needs depth and odometry; uses colour and laser where"),
+        (
+            format!("{}\n{bumper}", config("follow-depth")),
+            "valid; needs depth and obstacle-sources and odometry; uses colour",
+        ),
+        (
+            format!("without = [\"depth\"]\n{}", config("rgbd-ekf")),
+            "`depth-template` requires depth images",
+        ),
+    ] {
+        fs::write(&path, config).unwrap();
+        let output = tagalong().arg("check").arg(&path).output().unwrap();
+        let said = text(&output.stdout) + &text(&output.stderr);
+        assert!(said.contains(words), "{words} in {said}");
+    }
 }
 
 #[test]
@@ -216,17 +213,14 @@ fn a_config_that_asks_for_odometry_says_where_there_is_none() {
     let Some(log) = tagalong_conformance::testdata::find("laser/laser-following.mcap") else {
         return;
     };
-    let home = tempfile::tempdir().unwrap();
-    let ran = |args: &[&str]| {
-        let output = tagalong().args(args).arg(&log).current_dir(&home).output().unwrap();
-        (code(&output), text(&output.stderr) + &text(&output.stdout))
-    };
-    let (code, said) = ran(&["run", "laser-legs", "-o", "out"]);
+    let home = Home(tempfile::tempdir().unwrap());
+    let log = log.to_str().unwrap();
+    let (code, said) = home.tell(&["run", "laser-legs", "-o", "out", log]);
     assert_eq!(code, 0, "{said}");
     assert!(said.contains("is for a robot with odometry"), "{said}");
-    let (_, said) = ran(&["doctor", "laser-legs"]);
+    let (_, said) = home.tell(&["doctor", "laser-legs", log]);
     assert!(said.contains("the log has no odometry"), "{said}");
-    let (_, said) = ran(&["run", "laser-follow", "-o", "other"]);
+    let (_, said) = home.tell(&["run", "laser-follow", "-o", "other", log]);
     assert!(!said.contains("is for a robot with odometry"), "{said}");
 }
 
@@ -235,17 +229,13 @@ fn a_camera_for_a_log_of_scans_is_refused_with_the_way_out() {
     let Some(log) = tagalong_conformance::testdata::find("laser/laser-following.mcap") else {
         return;
     };
-    let home = tempfile::tempdir().unwrap();
-    let refusal = |args: &[&str]| {
-        let mut command = tagalong();
-        command.arg("run").args(args).arg(&log).args(["--camera", "/front"]);
-        let output = command.current_dir(&home).output().unwrap();
-        assert_ne!(code(&output), 0, "{}", text(&output.stdout));
-        text(&output.stderr)
-    };
-    let why = refusal(&[]);
+    let home = Home(tempfile::tempdir().unwrap());
+    let log = log.to_str().unwrap();
+    let (code, why) = home.tell(&["run", log, "--camera", "/front"]);
+    assert_ne!(code, 0, "{why}");
     assert!(why.contains("no camera `/front`") && why.contains("leave out --camera"), "{why}");
-    let why = refusal(&["laser-follow"]);
+    let (code, why) = home.tell(&["run", "laser-follow", log, "--camera", "/front"]);
+    assert_ne!(code, 0, "{why}");
     assert!(why.contains("laser-follow uses none, but laser: leave out --camera"), "{why}");
 }
 
@@ -273,30 +263,26 @@ fn write_cameras(path: &Path) {
 
 #[test]
 fn each_camera_has_a_run_of_its_own() {
-    let home = tempfile::tempdir().unwrap();
-    write_cameras(&home.path().join("two.mcap"));
-    let ran = |args: &[&str]| {
-        let output = tagalong().args(args).current_dir(&home).output().unwrap();
-        (code(&output), text(&output.stderr) + &text(&output.stdout))
-    };
-    let (code, said) = ran(&["run", "two.mcap", "--each-camera", "-o", "out"]);
+    let home = Home(tempfile::tempdir().unwrap());
+    write_cameras(&home.path("two.mcap"));
+    let (code, said) = home.tell(&["run", "two.mcap", "--each-camera", "-o", "out"]);
     assert_eq!(code, 3, "the third camera is reported, and part of it is lost: {said}");
-    let tracks = |camera: &str| {
-        let folder = home.path().join("out").join(camera);
-        fs::read_to_string(folder.join("tracks.csv")).unwrap_or_else(|_| panic!("{camera}: {said}"))
-    };
-    assert_eq!(tracks("camera"), tracks("rear"));
+    let [front, rear] = ["camera", "rear"].map(|camera| {
+        let path = home.path(&format!("out/{camera}/tracks.csv"));
+        fs::read_to_string(path).unwrap_or_else(|_| panic!("{camera}: {said}"))
+    });
+    assert_eq!(front, rear);
     assert!(said.contains("camera /side"), "{said}");
     // Without -o the folders have the names of log, config and camera.
-    let (_, said) = ran(&["run", "depth-ekf", "two.mcap", "--each-camera"]);
+    let (_, said) = home.tell(&["run", "depth-ekf", "two.mcap", "--each-camera"]);
     for camera in ["camera", "rear"] {
-        let folder = home.path().join(format!("runs/two-depth-ekf-{camera}"));
+        let folder = home.path(&format!("runs/two-depth-ekf-{camera}"));
         assert!(folder.join("report.json").exists(), "{said}");
     }
-    let (_, said) = ran(&["run", "two.mcap", "--camera", "/back"]);
+    let (_, said) = home.tell(&["run", "two.mcap", "--camera", "/back"]);
     assert!(said.contains("no camera `/back`; --camera can be one of: "), "{said}");
     assert!(said.contains("/rear") && !said.contains("no built-in pipeline fits"), "{said}");
-    let (code, said) = ran(&["run", "two.mcap", "--each-camera", "--camera", "/rear"]);
+    let (code, said) = home.tell(&["run", "two.mcap", "--each-camera", "--camera", "/rear"]);
     assert!(code == 2 && said.contains("cannot be used with"), "{said}");
 }
 

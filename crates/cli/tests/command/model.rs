@@ -1,12 +1,27 @@
 //! `tagalong model` on the hand-weighted networks.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::process::Output;
 
 use crate::common::{code, tagalong, text};
 
 fn network(name: &str) -> PathBuf {
     [env!("CARGO_MANIFEST_DIR"), "..", "network", "tests", "models", name].iter().collect()
+}
+
+/// Runs the command in a home folder, with the networks in its folder `data`.
+fn run_at(home: &Path, arguments: &[&str]) -> Output {
+    let mut command = tagalong();
+    command.args(arguments).env("TAGALONG_HOME", home.join("data")).current_dir(home);
+    command.output().unwrap()
+}
+
+/// The printed text of a command that ends well.
+fn printed_at(home: &Path, arguments: &[&str]) -> String {
+    let done = run_at(home, arguments);
+    assert_eq!(code(&done), 0, "{arguments:?}: {}", text(&done.stderr));
+    text(&done.stdout)
 }
 
 #[test]
@@ -36,22 +51,15 @@ fn a_network_is_described_by_the_config_that_runs_it() {
 #[test]
 fn a_config_that_is_written_runs_from_where_it_is() {
     let home = tempfile::tempdir().unwrap();
-    let place = |name: &str| home.path().join(name);
-    fs::create_dir_all(place("robot/models")).unwrap();
-    fs::copy(network("nanodet.onnx"), place("robot/models/net.onnx")).unwrap();
-    let written = ["model", "robot/models/net.onnx", "-o", "robot/people.toml"];
-    let told = tagalong().args(written).current_dir(home.path()).output().unwrap();
-    assert_eq!(code(&told), 0, "{}", text(&told.stderr));
-    let config = fs::read_to_string(place("robot/people.toml")).unwrap();
+    let robot = home.path().join("robot");
+    fs::create_dir_all(robot.join("models")).unwrap();
+    fs::copy(network("nanodet.onnx"), robot.join("models/net.onnx")).unwrap();
+    printed_at(home.path(), &["model", "robot/models/net.onnx", "-o", "robot/people.toml"]);
+    let config = fs::read_to_string(robot.join("people.toml")).unwrap();
     assert!(config.contains("model = \"models/net.onnx\"\n"), "{config}");
-    let check = || {
-        let mut command = tagalong();
-        command.args(["check", "robot/people.toml"]).current_dir(home.path()).output().unwrap()
-    };
-    let checked = check();
-    assert_eq!(code(&checked), 0, "{}", text(&checked.stderr));
-    fs::remove_file(place("robot/models/net.onnx")).unwrap();
-    let why = text(&check().stderr);
+    printed_at(home.path(), &["check", "robot/people.toml"]);
+    fs::remove_file(robot.join("models/net.onnx")).unwrap();
+    let why = text(&run_at(home.path(), &["check", "robot/people.toml"]).stderr);
     assert!(why.contains("robot/models/net.onnx`: cannot be read"), "{why}");
 }
 
@@ -68,18 +76,13 @@ fn known_networks_are_listed_with_their_licences() {
 
 #[test]
 fn an_installed_network_has_a_name() {
-    let home = tempfile::tempdir().unwrap();
-    let place = |name: &str| home.path().join(name);
-    let run = |arguments: &[&str]| {
-        let mut command = tagalong();
-        command.args(arguments).env("TAGALONG_HOME", place("data")).current_dir(home.path());
-        command.output().unwrap()
-    };
+    let folder = tempfile::tempdir().unwrap();
+    let home = folder.path();
+    let networks = home.join("data/networks");
     let file = network("yolox.onnx").display().to_string();
-    let told = run(&["model", "--install", &file, "--name", "blob-finder"]);
-    assert_eq!(code(&told), 0, "{}", text(&told.stderr));
-    assert!(text(&told.stdout).contains("model = \"blob-finder\""), "{}", text(&told.stdout));
-    let card = fs::read_to_string(place("data/networks/blob-finder.card.toml")).unwrap();
+    let told = printed_at(home, &["model", "--install", &file, "--name", "blob-finder"]);
+    assert!(told.contains("model = \"blob-finder\""), "{told}");
+    let card = fs::read_to_string(networks.join("blob-finder.card.toml")).unwrap();
     let card: toml::Table = card.parse().unwrap();
     assert_eq!(
         (card["family"].as_str(), card["file"].as_str()),
@@ -88,100 +91,90 @@ fn an_installed_network_has_a_name() {
     // A config names it, and it is a config by itself.
     let own = "[[detectors]]\nplugin = \"onnx\"\nconfig = { model = \"blob-finder\" }\n\
                [filter]\nplugin = \"image-kalman\"\n";
-    fs::write(place("own.toml"), own).unwrap();
+    fs::write(home.join("own.toml"), own).unwrap();
     for config in ["own.toml", "blob-finder", "blob-finder-depth", "network"] {
-        let checked = run(&["check", config]);
-        assert_eq!(code(&checked), 0, "{config}: {}", text(&checked.stderr));
+        printed_at(home, &["check", config]);
     }
     let other = network("yolov8.onnx").display().to_string();
-    let taken = run(&["model", "--install", &other, "--name", "blob-finder"]);
+    let taken = run_at(home, &["model", "--install", &other, "--name", "blob-finder"]);
     let why = text(&taken.stderr);
     assert!(why.contains("another network is installed as `blob-finder`"), "{why}");
-    let named = text(&run(&["model", "blob-finder"]).stderr);
+    let named = text(&run_at(home, &["model", "blob-finder"]).stderr);
     assert!(named.contains("is installed already: ") && !named.contains("did you mean"), "{named}");
     // The same file again: what was edited stays, unless it is asked for.
     let again = ["model", "--install", &file, "--name", "blob-finder"];
-    assert_eq!(code(&run(&again)), 0, "nothing was edited");
-    let config = place("data/networks/blob-finder.toml");
+    assert_eq!(code(&run_at(home, &again)), 0, "nothing was edited");
+    let config = networks.join("blob-finder.toml");
     let edited = fs::read_to_string(&config).unwrap() + "# mine\n";
     fs::write(&config, &edited).unwrap();
-    let kept = run(&again);
+    let kept = run_at(home, &again);
     let why = text(&kept.stderr);
     assert!(code(&kept) == 2 && why.contains("--overwrite"), "{why}");
     assert_eq!(fs::read_to_string(&config).unwrap(), edited);
-    assert_eq!(code(&run(&[&again[..], &["--overwrite"]].concat())), 0);
+    assert_eq!(code(&run_at(home, &[&again[..], &["--overwrite"]].concat())), 0);
     assert!(!fs::read_to_string(&config).unwrap().contains("# mine"));
-    let odd = run(&["model", "--install", &other, "--name", "a/b"]);
+    let odd = run_at(home, &["model", "--install", &other, "--name", "a/b"]);
     assert_eq!(code(&odd), 2, "{}", text(&odd.stderr));
-    let builtin = run(&["model", "--install", &other, "--name", "mono"]);
+    let builtin = run_at(home, &["model", "--install", &other, "--name", "mono"]);
     assert!(text(&builtin.stderr).contains("the name of a built-in config"));
-    let twin = run(&["model", "--install", &other, "--name", "blob-finder-depth"]);
+    let twin = run_at(home, &["model", "--install", &other, "--name", "blob-finder-depth"]);
     assert_eq!(code(&twin), 2, "{}", text(&twin.stderr));
-    let joined = fs::read_to_string(place("data/networks/blob-finder-depth.toml")).unwrap();
+    let joined = fs::read_to_string(networks.join("blob-finder-depth.toml")).unwrap();
     let joined: toml::Table = joined.parse().unwrap();
     let plugins: Vec<_> =
         joined["detectors"].as_array().unwrap().iter().map(|d| d["plugin"].as_str()).collect();
     assert_eq!(plugins, [Some("onnx"), Some("depth-template"), Some("depth-net")]);
     let unknown = network("depth.onnx").display().to_string();
-    assert_eq!(code(&run(&["model", "--install", &unknown])), 1);
-    let list = text(&run(&["model", "--list"]).stdout);
+    assert_eq!(code(&run_at(home, &["model", "--install", &unknown])), 1);
+    let list = text(&run_at(home, &["model", "--list"]).stdout);
     assert!(list.contains("blob-finder (taken for a log with colour alone)"), "{list}");
     // Mistyped names lead to it.
-    fs::write(place("own.toml"), own.replace("blob-finder", "blob-findr")).unwrap();
+    fs::write(home.join("own.toml"), own.replace("blob-finder", "blob-findr")).unwrap();
     for config in ["own.toml", "blob-findr"] {
-        let why = text(&run(&["check", config]).stderr);
+        let why = text(&run_at(home, &["check", config]).stderr);
         assert!(why.contains("did you mean `blob-finder`"), "{config}: {why}");
     }
 }
 
 #[test]
 fn installed_networks_are_listed_and_removed_by_their_names() {
-    let home = tempfile::tempdir().unwrap();
-    let run = |arguments: &[&str]| {
-        let mut command = tagalong();
-        command.args(arguments).env("TAGALONG_HOME", home.path()).output().unwrap()
-    };
-    let install = |file: &str, name: &str| {
+    let folder = tempfile::tempdir().unwrap();
+    let home = folder.path();
+    for (file, name) in [("yolox.onnx", "first"), ("yolov8.onnx", "second"), ("omz.onnx", "faces")]
+    {
         let file = network(file).display().to_string();
-        let told = run(&["model", "--install", &file, "--name", name]);
-        assert_eq!(code(&told), 0, "{}", text(&told.stderr));
-    };
-    install("yolox.onnx", "first");
-    install("yolov8.onnx", "second");
-    install("omz.onnx", "faces");
-    let list = text(&run(&["model", "--list"]).stdout);
+        printed_at(home, &["model", "--install", &file, "--name", name]);
+    }
+    let list = printed_at(home, &["model", "--list"]);
     assert!(
         list.contains("second (taken for") && list.contains("faces (re-identification"),
         "{list}"
     );
-    let typo = run(&["model", "--remove", "secnd"]);
+    let typo = run_at(home, &["model", "--remove", "secnd"]);
     assert_eq!(code(&typo), 2);
     assert!(text(&typo.stderr).contains("did you mean `second`?"), "{}", text(&typo.stderr));
-    let told = text(&run(&["model", "--remove", "second"]).stdout);
+    let told = printed_at(home, &["model", "--remove", "second"]);
     assert!(told.contains("`first` is now taken for a log with colour alone"), "{told}");
     for name in ["faces", "first"] {
-        assert_eq!(code(&run(&["model", "--remove", name])), 0);
+        printed_at(home, &["model", "--remove", name]);
     }
-    let left = fs::read_dir(home.path().join("networks")).unwrap().count();
+    let left = fs::read_dir(home.join("data/networks")).unwrap().count();
     assert_eq!(left, 0, "no file stays behind");
 }
 
 #[test]
 fn files_that_exist_are_replaced_on_request_alone() {
-    let home = tempfile::tempdir().unwrap();
-    fs::copy(network("nanodet.onnx"), home.path().join("net.onnx")).unwrap();
-    let run = |arguments: &[&str]| {
-        let mut command = tagalong();
-        command.args(arguments).current_dir(home.path()).output().unwrap()
-    };
+    let folder = tempfile::tempdir().unwrap();
+    let home = folder.path();
+    fs::copy(network("nanodet.onnx"), home.join("net.onnx")).unwrap();
     let writing = ["model", "net.onnx", "-o", "people.toml"];
-    fs::write(home.path().join("people.toml"), "mine").unwrap();
-    let refused = run(&writing);
+    fs::write(home.join("people.toml"), "mine").unwrap();
+    let refused = run_at(home, &writing);
     assert_eq!(code(&refused), 2);
     assert!(text(&refused.stderr).contains("people.toml exists"), "{}", text(&refused.stderr));
-    assert_eq!(fs::read_to_string(home.path().join("people.toml")).unwrap(), "mine");
-    assert_eq!(code(&run(&[&writing[..], &["--overwrite"]].concat())), 0);
-    let export = run(&["model", "--export", "depth-net", "net.onnx"]);
+    assert_eq!(fs::read_to_string(home.join("people.toml")).unwrap(), "mine");
+    printed_at(home, &[&writing[..], &["--overwrite"]].concat());
+    let export = run_at(home, &["model", "--export", "depth-net", "net.onnx"]);
     assert_eq!(code(&export), 2);
     assert!(text(&export.stderr).contains("net.onnx exists"), "{}", text(&export.stderr));
 }
@@ -196,15 +189,9 @@ fn an_installed_network_tracks_a_recorded_log() {
         return;
     };
     let home = tempfile::tempdir().unwrap();
-    let run = |arguments: &[&str]| {
-        let mut command = tagalong();
-        command.args(arguments).env("TAGALONG_HOME", home.path()).current_dir(home.path());
-        command.output().unwrap()
-    };
-    let told = run(&["model", "--install", file.to_str().unwrap()]);
-    assert_eq!(code(&told), 0, "{}", text(&told.stderr));
-    assert!(text(&told.stdout).contains("licence Apache-2.0"), "{}", text(&told.stdout));
-    let ran = run(&["run", log.to_str().unwrap(), "-o", "out"]);
+    let told = printed_at(home.path(), &["model", "--install", file.to_str().unwrap()]);
+    assert!(told.contains("licence Apache-2.0"), "{told}");
+    let ran = run_at(home.path(), &["run", log.to_str().unwrap(), "-o", "out"]);
     assert_eq!(code(&ran), 0, "{}", text(&ran.stderr));
     assert!(text(&ran.stderr).contains("taking yolox-nano"), "{}", text(&ran.stderr));
     let report = fs::read_to_string(home.path().join("out/report.json")).unwrap();
@@ -219,29 +206,20 @@ fn a_network_joined_with_depth_finds_people_close_by() {
     let find = tagalong_conformance::testdata::find;
     let Some(file) = find("networks/yolox_nano.onnx") else { return };
     let Some(log) = find("logs/lab2-camera1.mcap") else { return };
-    let home = tempfile::tempdir().unwrap();
-    let run = |arguments: &[&str]| {
-        let mut command = tagalong();
-        command.args(arguments).env("TAGALONG_HOME", home.path()).current_dir(home.path());
-        let done = command.output().unwrap();
-        assert_eq!(code(&done), 0, "{arguments:?}: {}", text(&done.stderr));
-        text(&done.stdout)
-    };
-    run(&["model", "--install", file.to_str().unwrap()]);
+    let folder = tempfile::tempdir().unwrap();
+    let home = folder.path();
+    printed_at(home, &["model", "--install", file.to_str().unwrap()]);
     let truth = log.with_extension("people.csv");
-    let recall = |config: &str| -> f64 {
-        run(&["run", config, log.to_str().unwrap(), "-o", config]);
-        let scored = run(&["eval", "--truth", truth.to_str().unwrap(), "--tracks", config]);
+    let truth = truth.to_str().unwrap();
+    let log = log.to_str().unwrap();
+    let chosen = text(&run_at(home, &["run", log, "-o", "by-itself"]).stderr);
+    assert!(chosen.contains("tagalong run yolox-nano-depth LOG"), "{chosen}");
+    let [alone, joined] = ["depth-verified", "yolox-nano-depth"].map(|config| -> f64 {
+        printed_at(home, &["run", config, log, "-o", config]);
+        let scored = printed_at(home, &["eval", "--truth", truth, "--tracks", config]);
         let line = scored.lines().find(|line| line.starts_with("recall ")).unwrap();
         line.split_whitespace().last().unwrap().parse().unwrap()
-    };
-    let mut by_itself = tagalong();
-    by_itself.args(["run", log.to_str().unwrap(), "-o", "by-itself"]);
-    let chosen = by_itself.env("TAGALONG_HOME", home.path()).current_dir(home.path()).output();
-    let chosen = text(&chosen.unwrap().stderr);
-    assert!(chosen.contains("tagalong run yolox-nano-depth LOG"), "{chosen}");
-    let alone = recall("depth-verified");
-    let joined = recall("yolox-nano-depth");
+    });
     assert!(alone < 0.6 && joined > 0.75, "{alone} {joined}");
 }
 
@@ -338,19 +316,17 @@ fn an_export_takes_the_weights_of_a_model_file() {
     let models = "../../configs/models";
     let other = "../../benches/models/depth-net.without-lab2.toml";
     let file = home.path().join("net.onnx");
-    let export = |weights: &str| {
+    for (weights, expected, words) in [(other, 0, ""), ("none.toml", 2, "none.toml")] {
         let told = tagalong()
             .args(["model", "--export", "depth-net", "--overwrite", "--weights", weights])
             .arg(&file)
             .output()
             .unwrap();
-        (code(&told), text(&told.stderr))
-    };
-    assert_eq!(export(other).0, 0);
+        let why = text(&told.stderr);
+        assert!(code(&told) == expected && why.contains(words), "{weights}: {why}");
+    }
     let shipped = fs::read(format!("{models}/depth-net.onnx")).unwrap();
     assert_ne!(fs::read(&file).unwrap(), shipped);
-    let (code, why) = export("none.toml");
-    assert!(code == 2 && why.contains("none.toml"), "{why}");
 }
 
 #[test]

@@ -63,6 +63,14 @@ impl Home {
         self.command(arguments).output().unwrap()
     }
 
+    /// The comparison is refused as a wrong use, with these words.
+    fn refuses_with(&self, words: &[&str]) {
+        let output = self.rooms(&[]);
+        let told = text(&output.stderr);
+        assert_eq!(code(&output), 2, "{told}");
+        words.iter().for_each(|word| assert!(told.contains(word), "{word} in {told}"));
+    }
+
     /// The tables for a page.
     fn page(&self) -> String {
         text(&self.rooms(&["--format", "markdown"]).stdout)
@@ -155,10 +163,11 @@ fn named_pipelines_are_compared_with_the_last_one_room_by_room_and_log_by_log() 
     let named = ["--configs", "configs/far.toml", "configs/blind.toml"];
     let report = home.rooms(&[&named[..], &["--format", "json"]].concat());
     let report: Value = serde_json::from_slice(&report.stdout).unwrap();
-    let figure = |pipeline: usize, room: usize| {
-        report["pipelines"][pipeline]["rooms"][room]["without"]["IDF1"].as_f64().unwrap()
-    };
-    let gained = (figure(0, 0) + figure(0, 1) - figure(1, 0) - figure(1, 1)) / 2.0;
+    let [far, blind] = [0, 1].map(|pipeline| {
+        let rooms = &report["pipelines"][pipeline]["rooms"];
+        [0, 1].map(|room| rooms[room]["without"]["IDF1"].as_f64().unwrap())
+    });
+    let gained = (far[0] + far[1] - blind[0] - blind[1]) / 2.0;
     let pair = &report["pairs"][0];
     assert_eq!((&pair["pipeline"], &pair["baseline"]), (&"far".into(), &"blind".into()));
     assert_eq!(pair["rooms"], 2);
@@ -264,34 +273,32 @@ fn a_room_of_single_frames_has_no_say() {
 #[test]
 fn mistakes_are_told_with_file_and_line() {
     let home = Home::new();
-    let tell = |code_wanted: i32, words: &[&str]| {
-        let output = home.rooms(&[]);
-        let told = text(&output.stderr);
-        assert_eq!(code(&output), code_wanted, "{told}");
-        words.iter().for_each(|word| assert!(told.contains(word), "{word} in {told}"));
-    };
     home.config("near", "", "\"manager.config.confirm_hit\" = [1]");
-    tell(2, &["near.toml:9:1", "did you mean `manager.config.confirm_hits`?"]);
+    home.refuses_with(&["near.toml:9:1", "did you mean `manager.config.confirm_hits`?"]);
     home.config("near", "", "manager.config.confirm_hits = [1, 99]");
-    tell(2, &["configs/near.toml:9:35", "= 99 is not allowed", "`confirm_hits` must lie between"]);
+    home.refuses_with(&[
+        "configs/near.toml:9:35",
+        "= 99 is not allowed",
+        "`confirm_hits` must lie between",
+    ]);
     let mut check = own_plugin();
     let checked = check.current_dir(home.folder.path()).args(["check", "configs/near.toml"]);
     let checked = checked.output().unwrap();
     assert!(code(&checked) == 2 && text(&checked.stderr).contains("= 99 is not allowed"));
     home.config("near", "", "");
-    tell(2, &["no config in the folder configs", "--configs"]);
+    home.refuses_with(&["no config in the folder configs", "--configs"]);
     home.config("near", TUNE, VALUES);
     let rooms = fs::read_to_string(home.path("rooms.toml")).unwrap();
     home.write("rooms.toml", &rooms.replace("b.mcap", "c.mcap"));
-    tell(2, &["rooms.toml:5:9", "c.mcap"]);
+    home.refuses_with(&["rooms.toml:5:9", "c.mcap"]);
     Drawn::of(3).write(&home.path("logs/c.mcap"));
-    tell(2, &["rooms.toml:5:9", "has no truth"]);
+    home.refuses_with(&["rooms.toml:5:9", "has no truth"]);
     home.write("rooms.toml", &format!("{rooms}[rooms.B.models]\nown = 'none.toml'\n"));
-    tell(2, &["rooms.toml:7:7", "there is no model none.toml"]);
+    home.refuses_with(&["rooms.toml:7:7", "there is no model none.toml"]);
     home.write("rooms.toml", "[rooms.A]\nlogs = [\"logs/a.mcap\"]\n");
-    tell(2, &["rooms.toml:1:", "two are needed"]);
+    home.refuses_with(&["rooms.toml:1:", "two are needed"]);
     fs::remove_file(home.path("rooms.toml")).unwrap();
-    tell(2, &["rooms.toml"]);
+    home.refuses_with(&["rooms.toml"]);
 }
 
 #[cfg(unix)]

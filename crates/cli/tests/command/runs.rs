@@ -232,20 +232,20 @@ fn a_log_whose_name_is_no_text_is_run_checked_and_compared() {
     fs::rename(home.path("walk.mcap"), &odd).unwrap();
     let people = odd.with_extension("people.csv");
     fs::write(people, crate::common::people(5)).unwrap();
-    let command = |words: &[&str]| {
+    for words in [
+        &["run", "-o", "out", "nearest.toml"][..],
+        &["view", "out", "-o", "page.html", "--log"],
+        &["inspect", "--format", "json"],
+        &["check", "--format", "json", "nearest.toml"],
+        &["bench", "--configs", "nearest.toml", "-o", "bench", "--logs"],
+    ] {
         let mut command = own_plugin();
         let output =
             command.current_dir(home.folder.path()).args(words).arg(&odd).output().unwrap();
         assert_eq!(code(&output), 0, "{words:?} {}", text(&output.stderr));
-        output
-    };
-    command(&["run", "-o", "out", "nearest.toml"]);
+    }
     let log = json(&home.path("out/origin.json"))["log"]["escaped"].as_str().unwrap().to_owned();
     assert!(log.ends_with("/n\\xff.mcap"), "{log}");
-    command(&["view", "out", "-o", "page.html", "--log"]);
-    command(&["inspect", "--format", "json"]);
-    command(&["check", "--format", "json", "nearest.toml"]);
-    command(&["bench", "--configs", "nearest.toml", "-o", "bench", "--logs"]);
 }
 
 #[test]

@@ -52,13 +52,12 @@ fn stopped_by(signal: &str, expected: i32) {
     let out = home.path().join("out");
     let bytes = fs::read(out.join("tracks.mcap")).unwrap();
     let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
-    let count = |topic: &str| {
+    let [frames, poses, texts] = ["/people/tracks", "/tf", "/people/tracks_json"].map(|topic| {
         let channel = summary.channels.values().find(|channel| channel.topic == topic).unwrap();
         summary.stats.as_ref().unwrap().channel_message_counts[&channel.id]
-    };
-    let frames = count("/people/tracks");
+    });
     assert!((5..600).contains(&frames), "{frames} frames");
-    assert_eq!((count("/tf"), count("/people/tracks_json")), (frames, frames));
+    assert_eq!((poses, texts), (frames, frames));
     let csv = fs::read_to_string(out.join("tracks.csv")).unwrap();
     assert!(csv.ends_with('\n') && csv.lines().all(|line| line.split(',').count() == 10));
     let report = fs::read_to_string(out.join("report.json")).unwrap();

@@ -39,9 +39,11 @@ fn the_same_scene_and_seed_are_the_same_bytes_on_any_number_of_threads() {
     let joints = &person.joints;
     let head = person.head_in_robot_m.unwrap();
     assert_eq!(joints.len(), 12);
-    let up = |name: &str| joints[name].in_robot_m[2];
-    assert!(up("left_ankle") < up("left_knee") && up("left_hip") < up("left_shoulder"));
-    assert!(up("right_shoulder") < head[2] && joints["right_shoulder"].px.is_some());
+    for [low, high] in [["left_ankle", "left_knee"], ["left_hip", "left_shoulder"]] {
+        assert!(joints[low].in_robot_m[2] < joints[high].in_robot_m[2], "{low} below {high}");
+    }
+    let shoulder = &joints["right_shoulder"];
+    assert!(shoulder.in_robot_m[2] < head[2] && shoulder.px.is_some());
     let inspected = tagalong().arg("inspect").arg(folder.path().join("a.mcap")).output().unwrap();
     let told = text(&inspected.stdout);
     assert!(told.contains("a pipeline can use: colour, depth, odometry"), "{told}");

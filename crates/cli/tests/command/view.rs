@@ -116,13 +116,12 @@ fn what_belongs_to_a_run_is_answered_with_the_command_that_shows_it() {
 #[test]
 fn the_truth_of_another_log_is_told() {
     let home = home();
-    let truth = |frames| crate::common::people(frames);
     for (name, frames, sign) in [
         ("walk.people.csv", 20, ""),
         ("other.people.csv", 20, "is named after other, and the run is of walk.mcap"),
         ("truth.csv", 40, "has people up to frame 40, and the last of the log is 20"),
     ] {
-        fs::write(home.path().join(name), truth(frames)).unwrap();
+        fs::write(home.path().join(name), crate::common::people(frames)).unwrap();
         let output = view(home.path(), &["one", "--overwrite", "--truth", name]);
         let said = text(&output.stdout);
         assert_eq!(code(&output), 0, "{}", text(&output.stderr));

@@ -203,21 +203,20 @@ fn all_kinds() -> Registry {
 #[test]
 fn a_plugin_is_built_as_what_it_is_and_as_nothing_else() {
     let registry = all_kinds();
-    let builds = |name: &str| {
-        [
+    for (place, name) in
+        ["finder", "fixed", "matcher", "believer", "keeper", "driver"].iter().enumerate()
+    {
+        let built = [
             registry.build_detector(name, None, &context()).is_ok(),
             registry.build_verifier(name, None, &context()).is_ok(),
             registry.build_associator(name, None, &context()).is_ok(),
             registry.build_filter(name, None, &context()).is_ok(),
             registry.build_manager(name, None, &context()).is_ok(),
             registry.build_controller(name, None, &context()).is_ok(),
-        ]
-    };
-    for (place, name) in
-        ["finder", "fixed", "matcher", "believer", "keeper", "driver"].iter().enumerate()
-    {
-        let built = builds(name).into_iter().enumerate();
-        assert!(built.into_iter().all(|(kind, is_ok)| is_ok == (kind == place)), "{name}");
+        ];
+        for (kind, is_ok) in built.into_iter().enumerate() {
+            assert_eq!(is_ok, kind == place, "{name}");
+        }
     }
     let kinds: Vec<_> = registry.plugins().map(|p| format!("{} {}", p.kind, p.name)).collect();
     let expected = ["filter believer", "verifier counting", "controller driver", "detector finder"];
@@ -280,12 +279,16 @@ fn a_model_is_trained_in_one_way() {
 #[test]
 fn a_model_is_the_built_in_one_or_that_of_the_file() {
     let context = Context::new(0, env!("CARGO_MANIFEST_DIR"), context().wheels);
-    let first = |text: &str| text.lines().next().map(str::to_owned).ok_or("empty".to_owned());
-    assert_eq!(context.model("", "built in", first), Ok("built in".into()));
-    assert_eq!(context.model("Cargo.toml", "built in", first), Ok("[package]".into()));
-    let refused = |file: &str, built_in| context.model(file, built_in, first).unwrap_err();
-    assert_eq!(refused("", "").to_string(), "model file ``: empty");
+    assert_eq!(context.model("", "built in", first_line), Ok("built in".into()));
+    assert_eq!(context.model("Cargo.toml", "built in", first_line), Ok("[package]".into()));
+    let empty = context.model("", "", first_line).expect_err("there is no line");
+    assert_eq!(empty.to_string(), "model file ``: empty");
     let tried = context.base_dir.join("nowhere.toml").display().to_string();
-    let why = refused("nowhere.toml", "x").to_string();
-    assert!(why.starts_with(&format!("model file `{tried}`: ")), "{why}");
+    let missing = context.model("nowhere.toml", "x", first_line).expect_err("there is no file");
+    assert!(missing.to_string().starts_with(&format!("model file `{tried}`: ")), "{missing}");
+}
+
+/// A model that is the first line of its file.
+fn first_line(text: &str) -> std::result::Result<String, String> {
+    text.lines().next().map(str::to_owned).ok_or("empty".to_owned())
 }

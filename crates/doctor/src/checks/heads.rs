@@ -68,13 +68,15 @@ fn head_range(camera: &Camera) -> Option<RangeInclusive<f64>> {
     let eye = camera.robot_from_camera.translation.vector;
     let ahead = (camera.robot_from_camera.rotation * nalgebra::Vector3::z()).xy();
     let ahead = ahead.try_normalize(1e-6)?;
-    let is_visible = |distance: &f64| {
-        let at = eye.xy() + ahead * *distance;
-        let rows = camera.project(&Point3::new(at.x, at.y, TOP_M)).map(|pixel| pixel.y);
-        rows.is_some_and(|row| row >= 0.0 && row < camera.height as f64)
-    };
-    let all = (0..STEPS).map(|step| NEAREST_M + STEP_M * step as f64);
-    let visible: Vec<f64> = all.filter(is_visible).collect();
+    let mut visible = Vec::new();
+    for step in 0..STEPS {
+        let distance = NEAREST_M + STEP_M * step as f64;
+        let at = eye.xy() + ahead * distance;
+        let pixel = camera.project(&Point3::new(at.x, at.y, TOP_M));
+        if pixel.is_some_and(|pixel| pixel.y >= 0.0 && pixel.y < camera.height as f64) {
+            visible.push(distance);
+        }
+    }
     Some(*visible.first()?..=*visible.last()?)
 }
 

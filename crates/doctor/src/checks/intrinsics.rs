@@ -7,10 +7,6 @@ use super::super::finding::{Finding, Severity};
 
 /// Checks that the intrinsics belong to the images.
 pub fn intrinsics(evidence: &Evidence) -> Option<Finding> {
-    let finding = |severity, measured: String| {
-        Finding::new("intrinsics", severity, measured)
-            .why("sizes and places in metres follow from the focal length")
-    };
     if let Some(LogError::Calibration { topic, source, .. }) = &evidence.refusal {
         let remedy = match source {
             CalibrationError::Size { .. } => {
@@ -18,14 +14,15 @@ pub fn intrinsics(evidence: &Evidence) -> Option<Finding> {
             }
             _ => "record a camera_info of this camera, calibrated as in REP 104",
         };
-        return Some(finding(Severity::Bad, format!("{topic}: {source}")).remedy(remedy));
+        let measured = format!("{topic}: {source}");
+        return Some(about_lens(Severity::Bad, measured).remedy(remedy));
     }
     let camera = evidence.samples.camera.as_ref()?;
     let Lens::Pinhole(lens) = &camera.lens else { return None };
     if evidence.inspection.facts.calibration_topic.is_none() {
         let remedy = "record its camera_info, and name it:\n[input] colour_info_topic = \"...\"";
         let measured = "none in the log: a view of 53 degrees is assumed".to_owned();
-        return Some(finding(Severity::Warn, measured).remedy(remedy));
+        return Some(about_lens(Severity::Warn, measured).remedy(remedy));
     }
     let width = camera.width as f64;
     let height = camera.height as f64;
@@ -41,9 +38,15 @@ pub fn intrinsics(evidence: &Evidence) -> Option<Finding> {
         camera.height,
         100.0 * off
     );
-    let finding = finding(severity, measured).figure("view_deg", view).figure("centre_off", off);
+    let finding = about_lens(severity, measured).figure("view_deg", view).figure("centre_off", off);
     Some(finding.remedy(
         "is the camera_info of this resolution? A centre at a quarter of the image is that of half \
          the size:\n[input] colour_info_topic = \"...\"",
     ))
+}
+
+/// A finding on the intrinsics, with what they decide.
+fn about_lens(severity: Severity, measured: String) -> Finding {
+    Finding::new("intrinsics", severity, measured)
+        .why("sizes and places in metres follow from the focal length")
 }

@@ -56,16 +56,10 @@ fn unset(topic: &str, used: StampSource, is_replaced: bool) -> Finding {
 /// Returns the worst problem with the stamps of a topic.
 fn judge(topic: &str, timing: &Timing) -> Finding {
     let period = timing.median_period_s;
-    let finding = |severity, measured| {
-        Finding::new("stamps", severity, measured)
-            .figure("longest_gap_s", timing.longest_gap_s)
-            .figure("longest_step_back_s", timing.longest_step_back_s)
-            .figure("steps_back", timing.steps_back as f64)
-    };
     if timing.longest_step_back_s > (4.0 * period).max(0.5) {
         let measured =
             format!("{topic}: the clock is set back by {:.2} s", timing.longest_step_back_s);
-        return finding(Severity::Bad, measured)
+        return about_stamps(timing, Severity::Bad, measured)
             .why("whoever was tracked before the jump is forgotten, and gets a new number")
             .remedy(
                 "record with one clock (use_sim_time on all nodes or on none; no looping bag)",
@@ -73,7 +67,7 @@ fn judge(topic: &str, timing: &Timing) -> Finding {
     }
     if timing.longest_gap_s > (6.0 * period).max(1.0) {
         let measured = format!("{topic}: a pause of {:.2} s", timing.longest_gap_s);
-        return finding(Severity::Warn, measured)
+        return about_stamps(timing, Severity::Warn, measured)
             .why("tracks end when nothing is seen for long")
             .remedy(format!("[clock] reset_gap_s = {:.1}", timing.longest_gap_s.ceil() + 1.0));
     }
@@ -82,11 +76,20 @@ fn judge(topic: &str, timing: &Timing) -> Finding {
             "{topic}: {} messages out of order, {} with the stamp of another",
             timing.steps_back, timing.repeated
         );
-        return finding(Severity::Warn, measured)
+        return about_stamps(timing, Severity::Warn, measured)
             .why("messages that come later than a few others are dropped")
             .remedy("[input] reorder_frames = 8");
     }
-    finding(Severity::Ok, format!("in order, the longest pause is {:.2} s", timing.longest_gap_s))
+    let measured = format!("in order, the longest pause is {:.2} s", timing.longest_gap_s);
+    about_stamps(timing, Severity::Ok, measured)
+}
+
+/// A finding on the stamps of a topic, with its figures.
+fn about_stamps(timing: &Timing, severity: Severity, measured: String) -> Finding {
+    Finding::new("stamps", severity, measured)
+        .figure("longest_gap_s", timing.longest_gap_s)
+        .figure("longest_step_back_s", timing.longest_step_back_s)
+        .figure("steps_back", timing.steps_back as f64)
 }
 
 #[cfg(test)]

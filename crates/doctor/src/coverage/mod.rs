@@ -223,8 +223,9 @@ mod tests {
         assert_eq!((found.moving, found.still), (1, 0));
         assert!(found.found().unwrap() > 0.95 && found.idle() < 0.05, "{found:?}");
         assert!(found.worth() > 0.95, "{found:?}");
-        let beside = |seconds| walker.place(seconds) + nalgebra::Vector2::new(0.0, 0.8);
-        let found = Coverage::of(&course(&[&beside]), &scenery());
+        let aside = nalgebra::Vector2::new(0.0, 0.8);
+        let beside = course(&[&|seconds| walker.place(seconds) + aside]);
+        let found = Coverage::of(&beside, &scenery());
         assert!(found.found().unwrap() < 0.2, "a track 0.8 m beside explains nothing: {found:?}");
     }
 

@@ -86,16 +86,17 @@ impl Plan {
 
     /// Returns the group of cells as a blob, if it has the size of a person.
     fn person(&self, group: &[Key], view: &View) -> Option<Blob> {
-        let cells = || group.iter().filter_map(|key| self.cells.get(key));
-        let changed: u32 = cells().map(|cell| cell.changed).sum();
+        let cells: Vec<&Cell> = group.iter().filter_map(|key| self.cells.get(key)).collect();
+        let changed: u32 = cells.iter().map(|cell| cell.changed).sum();
         let weighted = group
             .iter()
-            .zip(cells())
+            .zip(&cells)
             .map(|(key, cell)| centre(key).coords * f64::from(cell.changed));
         let place = Point2::from(weighted.sum::<nalgebra::Vector2<f64>>() / f64::from(changed));
-        let (low, high) = cells().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), cell| {
-            (low.min(cell.low), high.max(cell.high))
-        });
+        let (low, high) =
+            cells.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), cell| {
+                (low.min(cell.low), high.max(cell.high))
+            });
         let width_m = extent(group, 0).max(extent(group, 1));
         let area = f64::from(changed) / view.pixels_per_square_metre((place - view.eye()).norm());
         let is_person =
@@ -129,8 +130,7 @@ fn group(first: Key, left: &mut BTreeSet<Key>) -> Vec<Key> {
 
 /// Returns the extent of cells along an axis, m.
 fn extent(group: &[Key], axis: usize) -> f64 {
-    let along = || group.iter().map(|key| key[axis]);
-    let low = along().min().unwrap_or(0);
-    let high = along().max().unwrap_or(0);
+    let low = group.iter().map(|key| key[axis]).min().unwrap_or(0);
+    let high = group.iter().map(|key| key[axis]).max().unwrap_or(0);
     f64::from(high - low + 1) * CELL_M
 }

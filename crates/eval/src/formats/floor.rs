@@ -28,19 +28,21 @@ pub struct Row {
 /// A missing column, something that is no number.
 pub fn parse(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
     let table = Table::new(text, file)?;
-    let column = |name: &'static str| Ok::<_, FormatError>((name, table.column(name)?));
-    let [scan, id, ignore, source] =
-        [column("scan")?, column("id")?, column("ignore")?, column("source")?];
-    let [x, y] = [column("x_laser_m")?, column("y_laser_m")?];
+    let scan = table.column("scan")?;
+    let id = table.column("id")?;
+    let ignore = table.column("ignore")?;
+    let source = table.column("source")?;
+    let x = table.column("x_laser_m")?;
+    let y = table.column("y_laser_m")?;
     let rows = table.rows.iter().map(|line| {
-        let at_m = [line.number(x.1, x.0)?, line.number(y.1, y.0)?];
+        let at_m = [line.number(x, "x_laser_m")?, line.number(y, "y_laser_m")?];
         Ok(Row {
-            scan: line.frame(scan.1, 0)?,
-            person: FloorPoint { id: line.whole(id.1, id.0)?, at_m },
+            scan: line.frame(scan, 0)?,
+            person: FloorPoint { id: line.whole(id, "id")?, at_m },
             robot_m: place(&table, line, ["x_robot_m", "y_robot_m"])?,
             odom_m: place(&table, line, ["x_odom_m", "y_odom_m"])?,
-            ignore: line.number(ignore.1, ignore.0)? != 0.0,
-            annotated: line.text(source.1, source.0)? == "annotated",
+            ignore: line.number(ignore, "ignore")? != 0.0,
+            annotated: line.text(source, "source")? == "annotated",
         })
     });
     rows.collect()

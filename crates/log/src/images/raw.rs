@@ -32,13 +32,15 @@ pub fn decode_raw(
 ) -> Result<Pixels, ImageError> {
     let layout = Layout::of(&image.encoding)?;
     check_size(image.width.into(), image.height.into(), layout.bytes_per_pixel(), limits)?;
-    let rows = |bytes: usize| Rows::new(image, image.height as usize, image.width as usize * bytes);
+    let height = image.height as usize;
+    let width = image.width as usize;
     let rows = match layout {
         Layout::Yuv(order) => return yuv::decode(image, order).map(Pixels::Colour),
         Layout::Bayer(pattern) => {
-            return Ok(Pixels::Colour(bayer::interpolate(&rows(1)?, pattern)));
+            let rows = Rows::new(image, height, width)?;
+            return Ok(Pixels::Colour(bayer::interpolate(&rows, pattern)));
         }
-        Layout::Packed(bytes) => rows(bytes as usize)?,
+        Layout::Packed(bytes) => Rows::new(image, height, width * bytes as usize)?,
     };
     let big = image.is_bigendian != 0;
     let pixels = match image.encoding.as_str() {

@@ -46,8 +46,8 @@ impl<'a> Nibbles<'a> {
             return self.long_number();
         }
         // Without branches on the length, which is as good as random.
-        let digit = |i: u32| (self.next >> (60 - 4 * i)) as u32 & 7;
-        let digits = (0..SHORT).fold(0, |value, i| value | digit(i) << (3 * i));
+        let digits = (0..SHORT)
+            .fold(0, |value, i| value | ((self.next >> (60 - 4 * i)) as u32 & 7) << (3 * i));
         self.drop_first(length);
         Some(digits & ((1 << (3 * length)) - 1))
     }

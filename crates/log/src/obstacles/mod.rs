@@ -79,10 +79,11 @@ mod tests {
     #[test]
     fn a_mount_looks_along_its_x_axis_with_any_kind() {
         let mount = Some([-0.2, 0.1, 0.3, 0.0, 0.0, 180.0]);
-        let of = |kind| ObstacleTopic { mount, ..ObstacleTopic::new("rear", kind, "/rear") };
-        let range = of(ObstacleKind::Range).robot_from_sensor().unwrap();
+        let [range, camera] = [ObstacleKind::Range, ObstacleKind::Depth].map(|kind| {
+            let topic = ObstacleTopic { mount, ..ObstacleTopic::new("rear", kind, "/rear") };
+            topic.robot_from_sensor().unwrap()
+        });
         assert!((range * Point3::new(1.0, 0.0, 0.0) - Point3::new(-1.2, 0.1, 0.3)).norm() < 1e-9);
-        let camera = of(ObstacleKind::Depth).robot_from_sensor().unwrap();
         // Ahead of the camera, to its right and below it.
         assert!((camera * Point3::new(0.5, 0.2, 1.0) - Point3::new(-1.2, 0.6, 0.1)).norm() < 1e-9);
         let known = tagalong_geometry::Camera::mounted(

@@ -302,12 +302,16 @@ impl Assembler {
         intake: &Intake,
         tally: &mut Tally,
     ) -> Sensors {
-        let odom_from_robot = |stamp| self.pose_at(plan, stamp, intake).pose;
         let robot_frame = robot_frame(&plan.scan, &plan.input);
-        let tf = &intake.tf;
-        let odom_from_robot = &odom_from_robot;
         intake.sensors.iter().fold(sensors, |all, (topic, sensor)| {
-            let moment = Moment { topic, stamp, camera, robot_frame, tf, odom_from_robot };
+            let moment = Moment {
+                topic,
+                stamp,
+                camera,
+                robot_frame,
+                tf: &intake.tf,
+                odom_from_robot: &|stamp| self.pose_at(plan, stamp, intake).pose,
+            };
             sensor.add_to(all, &moment, tally)
         })
     }
@@ -328,7 +332,6 @@ impl Assembler {
         }
         // Out of the intake, which gives the poses meanwhile.
         let mut readers = std::mem::take(&mut intake.obstacles);
-        let odom_from_robot = |stamp| self.pose_at(plan, stamp, intake).pose;
         let format = DepthFormat { unit_m: plan.input.depth_unit_m, limits: &plan.limits };
         let mut readings = Vec::new();
         for reader in &mut readers {
@@ -339,7 +342,7 @@ impl Assembler {
                 camera,
                 robot_frame: robot_frame(&plan.scan, &plan.input),
                 tf: &intake.tf,
-                odom_from_robot: &odom_from_robot,
+                odom_from_robot: &|stamp| self.pose_at(plan, stamp, intake).pose,
             };
             readings.extend(reader.reading(&moment, format, tally));
         }

@@ -75,22 +75,16 @@ fn unfit(scan: &Scan, image: &str, topic: &str, is_disparity: bool) -> Option<St
 
 /// Returns the calibrations that may be those of an image topic, the nearest first.
 fn candidates(scan: &Scan, image: &str, is_disparity: bool) -> Vec<FoundCalibration> {
-    let mut found: Vec<FoundCalibration> = Vec::new();
-    let mut add = |topic: &str, relation| {
-        let is_new = !found.iter().any(|known| known.topic == topic);
-        if is_new && scan.infos.contains_key(topic) {
-            found.push(FoundCalibration::new(topic, relation));
-        }
-    };
+    let mut likely: Vec<(String, Relation)> = Vec::new();
     let folder = folder_of(image);
-    add(&format!("{folder}/camera_info"), Relation::Own);
+    likely.push((format!("{folder}/camera_info"), Relation::Own));
     let kind = scan.topics.get(image).map(|topic| topic.kind);
     // Disparities are those of the left camera, and its calibration stands beside its images.
     if is_disparity || kind == Some(Type::DisparityImage) {
-        add(&format!("{folder}/left/camera_info"), Relation::Own);
+        likely.push((format!("{folder}/left/camera_info"), Relation::Own));
     }
     if kind == Some(Type::PointCloud) {
-        add(&calibration_by_points(image), Relation::Own);
+        likely.push((calibration_by_points(image), Relation::Own));
     }
     let name = TopicName::of(image);
     let mut others: Vec<(usize, &String)> =
@@ -100,7 +94,7 @@ fn candidates(scan: &Scan, image: &str, is_disparity: bool) -> Vec<FoundCalibrat
     for (_, info) in others.iter().filter(|(common, _)| *common > 0) {
         let other = TopicName::of(info);
         if (&other.device, other.stream, other.side) == (&name.device, name.stream, name.side) {
-            add(info, Relation::SameStream);
+            likely.push(((*info).clone(), Relation::SameStream));
         }
     }
     let frame = scan.frame_of(image).filter(|frame| !frame.is_empty());
@@ -108,7 +102,14 @@ fn candidates(scan: &Scan, image: &str, is_disparity: bool) -> Vec<FoundCalibrat
         let is_same = frame.is_some_and(|frame| scan.infos[*info].header.frame_id == frame);
         // Recordings of some cameras have one frame for all streams.
         if is_same && !name.contradicts(&TopicName::of(info)) {
-            add(info, Relation::SameFrame);
+            likely.push(((*info).clone(), Relation::SameFrame));
+        }
+    }
+    let mut found: Vec<FoundCalibration> = Vec::new();
+    for (topic, relation) in likely {
+        let is_new = !found.iter().any(|known| known.topic == topic);
+        if is_new && scan.infos.contains_key(&topic) {
+            found.push(FoundCalibration::new(&topic, relation));
         }
     }
     if found.is_empty()
@@ -123,20 +124,22 @@ fn candidates(scan: &Scan, image: &str, is_disparity: bool) -> Vec<FoundCalibrat
 fn only_of_size(scan: &Scan, image: &str) -> Option<String> {
     let size = scan.topics.get(image)?.size?;
     let name = TopicName::of(image);
-    let has_images = |info: &str| {
-        scan.topics.iter().any(|(other, topic)| {
-            let is_image = topic.pixels.is_some() && other != image;
-            is_image && format!("{}/camera_info", folder_of(other)) == info
-        })
-    };
     let fitting = scan.infos.iter().filter(|(info, message)| {
         (message.width, message.height) == size
-            && !has_images(info)
+            && !has_other_images(scan, image, info)
             && !name.contradicts(&TopicName::of(info))
     });
     let mut names = fitting.map(|(info, _)| info.clone());
     let only = names.next()?;
     names.next().is_none().then_some(only)
+}
+
+/// Whether a calibration stands beside other images than these.
+fn has_other_images(scan: &Scan, image: &str, info: &str) -> bool {
+    scan.topics.iter().any(|(other, topic)| {
+        let is_image = topic.pixels.is_some() && other != image;
+        is_image && format!("{}/camera_info", folder_of(other)) == info
+    })
 }
 
 /// Returns the folder of an image topic, without the endings of transports.

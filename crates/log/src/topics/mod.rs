@@ -159,28 +159,22 @@ pub(crate) fn choose(
         let topic = choose_sensor(scan, sensor, input, images.as_deref())?;
         sensors.extend(topic.map(|topic| (sensor.input, topic)));
     }
+    let colour_info = choose_info(scan, input, "colour_info_topic", colour.as_deref())?;
+    let depth_info = choose_info(scan, input, "depth_info_topic", depth.as_deref())?;
+    let right_info = choose_info(scan, input, "right_info_topic", right.as_deref())?;
     let mut calibrations = BTreeMap::new();
-    let mut info = |key, wanted: &Option<String>, image: &Option<String>| {
-        let is_disparity = key == "depth_info_topic" && input.disparity.is_some();
-        let named = named(scan, key, wanted.as_deref(), is_info)?;
-        let Some(image) = image else { return Ok::<_, LogError>(named) };
-        let own = named.map(|topic| FoundCalibration::new(&topic, Relation::Own));
-        let Some(found) = own.or_else(|| calibration_of(scan, image, is_disparity)) else {
-            return Ok(None);
-        };
-        calibrations.insert(image.clone(), found.clone());
-        Ok(Some(found.topic))
-    };
-    let colour_info = info("colour_info_topic", &input.colour_info_topic, &colour)?;
-    let depth_info = info("depth_info_topic", &input.depth_info_topic, &depth)?;
-    let right_info = info("right_info_topic", &input.right_info_topic, &right)?;
+    for (image, info) in [(&colour, &colour_info), (&depth, &depth_info), (&right, &right_info)] {
+        if let (Some(image), Some(info)) = (image, info) {
+            calibrations.insert(image.clone(), info.clone());
+        }
+    }
     let mut chosen = Chosen {
         colour,
         depth,
         right,
-        colour_info,
-        depth_info,
-        right_info,
+        colour_info: colour_info.map(|info| info.topic),
+        depth_info: depth_info.map(|info| info.topic),
+        right_info: right_info.map(|info| info.topic),
         odometry: None,
         odom_frames: None,
         calibrations,
@@ -208,6 +202,23 @@ pub(crate) fn choose(
         chosen.sensor_problems.insert(Input::Laser, problem);
     }
     Ok(chosen)
+}
+
+/// Chooses the calibration of a stream of images: the named one, or else the nearest.
+fn choose_info(
+    scan: &Scan,
+    input: &InputSettings,
+    key: &str,
+    image: Option<&str>,
+) -> Result<Option<FoundCalibration>, LogError> {
+    let (wanted, is_disparity) = match key {
+        "colour_info_topic" => (&input.colour_info_topic, false),
+        "depth_info_topic" => (&input.depth_info_topic, input.disparity.is_some()),
+        _ => (&input.right_info_topic, false),
+    };
+    let named = named(scan, key, wanted.as_deref(), is_info)?;
+    let own = named.map(|topic| FoundCalibration::new(&topic, Relation::Own));
+    Ok(own.or_else(|| calibration_of(scan, image?, is_disparity)))
 }
 
 /// Chooses the images, all of one rig unless the settings name others; returns them with the name of
@@ -369,21 +380,25 @@ fn check(
         }
     }
     let is_blind = chosen.colour.is_none() && chosen.depth.is_none();
-    let lacks = |input, topic: &Option<String>| inputs.requires(input) && topic.is_none();
-    let image = |lacks, wanted, key: &str, types: &str| Requirement {
+    let lacks_colour = inputs.requires(Input::Colour) && chosen.colour.is_none();
+    let lacks_depth = inputs.requires(Input::Depth) && chosen.depth.is_none();
+    let lacks_right = inputs.requires(Input::Right) && chosen.right.is_none();
+    let has_no_clock = is_blind && chosen.primary().is_empty();
+    let [colour, depth, right, any] = [
+        (lacks_colour, "colour images", "colour_topic", COLOUR),
+        (lacks_depth, "depth images", "depth_topic", DEPTH),
+        (lacks_right, "right images of a stereo pair", "right_topic", COLOUR),
+        (has_no_clock, "images at all", "colour_topic", COLOUR),
+    ]
+    .map(|(lacks, wanted, key, types)| Requirement {
         lacks,
         wanted,
         key: key.to_owned(),
         types: types.to_owned(),
         fits: Box::new(if key == "depth_topic" { could_be_depth } else { is_usable_picture }),
         taken: chosen.colour.as_deref().filter(|_| key == "right_topic"),
-    };
-    let lacks_right = lacks(Input::Right, &chosen.right);
-    let images = [
-        image(lacks(Input::Colour, &chosen.colour), "colour images", "colour_topic", COLOUR),
-        image(lacks(Input::Depth, &chosen.depth), "depth images", "depth_topic", DEPTH),
-        image(lacks_right, "right images of a stereo pair", "right_topic", COLOUR),
-    ];
+    });
+    let images = [colour, depth, right];
     let sensors = SENSORS.iter().map(|sensor| Requirement {
         lacks: inputs.requires(sensor.input) && chosen.sensor(sensor.input).is_none(),
         wanted: sensor.wanted,
@@ -392,8 +407,6 @@ fn check(
         fits: Box::new(|topic| is_of(sensor, topic)),
         taken: None,
     });
-    let has_no_clock = is_blind && chosen.primary().is_empty();
-    let any = image(has_no_clock, "images at all", "colour_topic", COLOUR);
     match images.into_iter().chain(sensors).chain([any]).find(|required| required.lacks) {
         None => Ok(()),
         Some(required) => Err(required.error(scan, account)),

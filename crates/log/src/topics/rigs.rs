@@ -294,19 +294,18 @@ impl Rig {
                 if is_right { colour_rank(name, topic) } else { None }
             })
         });
-        let problem = |depth: &str| {
-            let colour = colour.as_deref()?;
-            depth_problem(scan, input, colour, depth)
-        };
         let depth = named.depth.clone().or_else(|| {
             self.best(scan, input, |name, topic| {
                 let rank =
                     depth_rank(name, topic)? + registered_rank(scan, colour.as_deref(), name);
                 // Any depth that can be used is better than one that cannot.
-                Some(if problem(name).is_some() { rank - 100 } else { rank })
+                let problem = colour.as_deref().and_then(|it| depth_problem(scan, input, it, name));
+                Some(if problem.is_some() { rank - 100 } else { rank })
             })
         });
-        let depth_problem = depth.as_deref().and_then(problem);
+        let both = colour.as_deref().zip(depth.as_deref());
+        let depth_problem =
+            both.and_then(|(colour, depth)| depth_problem(scan, input, colour, depth));
         // The settings may name the right images as the colour topic.
         let right = right.filter(|topic| Some(topic) != colour.as_ref());
         Pick { colour, depth, right, depth_problem }

@@ -53,21 +53,23 @@ impl Body {
 /// Returns rings around trunk and head; the origin is the centre of the head.
 fn points(head_m: f64) -> Vec<Vector3<f64>> {
     let mut out = Vec::new();
-    let mut ring = |radius: f64, z: f64| {
-        out.extend((0..RING_POINTS).map(|i| {
-            let (sin, cos) = (TAU * f64::from(i) / f64::from(RING_POINTS)).sin_cos();
-            Vector3::new(radius * cos, radius * sin, z)
-        }));
-    };
     let mut z = -head_m;
     while z <= -SHOULDERS_BELOW_M {
-        ring(TRUNK_M, z);
+        out.extend(ring_points(TRUNK_M, z));
         z += RING_APART_M;
     }
     for part in [-0.9_f64, -0.45, 0.0, 0.45, 0.9] {
-        ring(HEAD_M * (1.0 - part * part).sqrt(), part * HALF_HEAD_M);
+        out.extend(ring_points(HEAD_M * (1.0 - part * part).sqrt(), part * HALF_HEAD_M));
     }
     out
+}
+
+/// The points of a level circle at this height.
+fn ring_points(radius: f64, z: f64) -> impl Iterator<Item = Vector3<f64>> {
+    (0..RING_POINTS).map(move |i| {
+        let (sin, cos) = (TAU * f64::from(i) / f64::from(RING_POINTS)).sin_cos();
+        Vector3::new(radius * cos, radius * sin, z)
+    })
 }
 
 fn cloud(points: &[Vector3<f64>], at: Stamp, frame: &str) -> PointCloud2<'static> {

@@ -124,42 +124,48 @@ fn clear_marker(header: &Header) -> Marker {
 
 fn figure_markers(figure: &Figure, header: &Header) -> Vec<Marker> {
     let Color { r, g, b, a } = figure.colour;
-    let opaque = ColorRgba { r: r as f32, g: g as f32, b: b as f32, a: 1.0 };
-    let marker = |ns: &str, shape, pose: &Isometry3<f64>| Marker {
+    let opaque = Marker {
         header: header.clone(),
-        ns: ns.to_owned(),
         // Beyond 2^31 numbers repeat, which no run reaches.
         id: figure.id as i32,
-        shape,
         action: Marker::ADD,
-        pose: pose.into(),
-        color: opaque,
+        pose: (&Isometry3::identity()).into(),
+        color: ColorRgba { r: r as f32, g: g as f32, b: b as f32, a: 1.0 },
         lifetime: LIFETIME,
         ..Marker::default()
     };
-    let color = ColorRgba { a: a as f32, ..opaque };
     let body = Marker {
+        ns: "people".into(),
+        shape: Marker::CYLINDER,
         scale: figure.size(),
-        color,
-        ..marker("people", Marker::CYLINDER, &figure.middle)
+        pose: (&figure.middle).into(),
+        color: ColorRgba { a: a as f32, ..opaque.color },
+        ..opaque.clone()
     };
     let text = Marker {
+        ns: "numbers".into(),
+        shape: Marker::TEXT,
         scale: Point { z: TEXT_M, ..Point::default() },
+        pose: (&figure.top).into(),
         text: figure.label.clone(),
-        ..marker("numbers", Marker::TEXT, &figure.top)
+        ..opaque.clone()
     };
     let arrow = figure.arrow.map(|(tail, length)| Marker {
         points: vec![point(&tail.translation.vector.into()), tip(&tail, length)],
         // The widths of shaft and tip; the length follows from the points.
         scale: Point { x: ARROW_WIDTH_M, y: 2.0 * ARROW_WIDTH_M, z: 0.0 },
-        ..marker("velocities", Marker::ARROW, &Isometry3::identity())
+        ns: "velocities".into(),
+        shape: Marker::ARROW,
+        ..opaque.clone()
     });
     // Viewers report lines without points as faulty.
     let trail = (!figure.trail.is_empty()).then(|| Marker {
         points: figure.trail.clone(),
         // The width of the lines.
         scale: Point { x: TRAIL_M, ..Point::default() },
-        ..marker("trails", Marker::LINE_LIST, &Isometry3::identity())
+        ns: "trails".into(),
+        shape: Marker::LINE_LIST,
+        ..opaque.clone()
     });
     [Some(body), Some(text), arrow, trail].into_iter().flatten().collect()
 }
@@ -179,7 +185,7 @@ pub(super) fn scene(record: &FrameRecord<'_>, trails: &Trails, odom_frame: &str)
     let timestamp = record.stamp.into();
     let clear =
         SceneEntityDeletion { timestamp, extent: SceneEntityDeletion::ALL, id: String::new() };
-    let entity = |figure: Figure| SceneEntity {
+    let entities = figures(record, trails).into_iter().map(|figure| SceneEntity {
         timestamp,
         frame_id: odom_frame.to_owned(),
         id: format!("person_{}", figure.id),
@@ -202,11 +208,8 @@ pub(super) fn scene(record: &FrameRecord<'_>, trails: &Trails, odom_frame: &str)
         }],
         lines: trail(&figure).into_iter().collect(),
         ..SceneEntity::default()
-    };
-    SceneUpdate {
-        deletions: vec![clear],
-        entities: figures(record, trails).into_iter().map(entity).collect(),
-    }
+    });
+    SceneUpdate { deletions: vec![clear], entities: entities.collect() }
 }
 
 fn arrow(tail: &Isometry3<f64>, length: f64, figure: &Figure) -> ArrowPrimitive {

@@ -50,14 +50,13 @@ pub(super) fn declared_inputs(
     let described = settings.appearance.has_network() && compares;
     let looks = described.then_some(("[appearance]", APPEARANCE));
     let plugins = plugins.iter().copied();
-    let users: Vec<Declared<'_>> =
+    let mut all: Vec<Declared<'_>> =
         plugins.chain(odometry).chain(steering).chain(people).chain(looks).collect();
     // The pipeline computes depth from the pair; that of the log is used where it is there.
-    let has_stereo = settings.stereo.is_some();
-    let of_log = |inputs: Inputs| if has_stereo { inputs.relax(Input::Depth) } else { inputs };
-    let stereo = has_stereo.then_some(("[stereo]", STEREO));
-    let all: Vec<Declared<'_>> =
-        users.into_iter().map(|(name, inputs)| (name, of_log(inputs))).chain(stereo).collect();
+    if settings.stereo.is_some() {
+        all.iter_mut().for_each(|(_, inputs)| *inputs = inputs.relax(Input::Depth));
+        all.push(("[stereo]", STEREO));
+    }
     for input in &settings.without {
         if let Some((name, _)) = all.iter().find(|(_, inputs)| inputs.requires(*input)) {
             let message = format!(
@@ -92,9 +91,8 @@ fn guesses_motion(settings: &PipelineSettings) -> bool {
 /// Returns true if the settings leave out every sensor of obstacles, and do not say that the robot
 /// drives without.
 fn lacks_eyes(settings: &PipelineSettings) -> bool {
-    let leaves_out = |input| settings.without.contains(&input);
-    let has_depth = settings.stereo.is_some() || !leaves_out(Input::Depth);
+    let has_depth = settings.stereo.is_some() || !settings.without.contains(&Input::Depth);
     settings.collision_monitor.obstacles == ObstacleSource::Sensed
         && !has_depth
-        && leaves_out(Input::Laser)
+        && settings.without.contains(&Input::Laser)
 }

@@ -175,8 +175,8 @@ impl ConfigSource {
         document: &Document,
         name: &str,
     ) -> Result<T, BuildError> {
-        let read = || parse_settings(document.root()?.remove(name));
-        read().map_err(|error| self.mistake(&document.locate(error)))
+        let settings = document.root().and_then(|mut root| parse_settings(root.remove(name)));
+        settings.map_err(|error| self.mistake(&document.locate(error)))
     }
 
     /// Returns the files that the settings name, such as models, with the name used there.

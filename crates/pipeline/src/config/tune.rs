@@ -215,21 +215,23 @@ fn spread(
     now: &toml::Value,
 ) -> Result<Values, ConfigError> {
     let span = table.span();
-    let at = |message: String| ConfigError::new(message).or_at(Some(span.clone()));
     let table = toml::Spanned::new(span.clone(), DeValue::Table(table.into_inner()));
     let Spread { between: [low, high], steps } =
         Spread::deserialize(toml::de::ValueDeserializer::from(table))?;
     if !(low.is_finite() && high.is_finite() && low < high) {
-        return Err(at(format!("`{key}` lies between {low} and {high}: the lower number first")));
+        let message = format!("`{key}` lies between {low} and {high}: the lower number first");
+        return Err(ConfigError::new(message).or_at(Some(span)));
     }
     if !(2..=MAX_VALUES).contains(&steps) {
-        return Err(at(format!("`{key}`: `steps` must be from 2 to {MAX_VALUES}, not {steps}")));
+        let message = format!("`{key}`: `steps` must be from 2 to {MAX_VALUES}, not {steps}");
+        return Err(ConfigError::new(message).or_at(Some(span)));
     }
     let mut values: Vec<toml::Value> = Vec::new();
     for value in (0..steps).map(|i| low + (high - low) * i as f64 / (steps - 1) as f64) {
         let value = match now {
             toml::Value::Integer(_) => toml::Value::Integer(value.round() as i64),
-            _ => as_now(key, toml::Value::Float(value), now).map_err(|e| at(e.message))?,
+            _ => as_now(key, toml::Value::Float(value), now)
+                .map_err(|error| ConfigError::new(error.message).or_at(Some(span.clone())))?,
         };
         // Rounding to whole numbers can make neighbours equal.
         if !values.contains(&value) {

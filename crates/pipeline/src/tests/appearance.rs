@@ -108,16 +108,11 @@ fn late_calls_are_counted_and_leave_no_appearance() {
 
 #[test]
 fn a_network_that_cannot_be_used_is_an_error_with_its_line() {
-    let world = World::default();
-    let refusal = |text: &str| {
-        let built = Pipeline::builder(&world.registry()).from_toml(text);
-        built.err().unwrap().to_string()
-    };
     let other = config("", "").replace("osnet.onnx", "yolox.onnx");
-    let why = refusal(&other);
+    let why = refusal_of(&other);
     assert!(why.contains("is no network for re-identification"), "{why}");
     assert!(why.contains("model = "), "{why}");
-    let why = refusal(&config("max_operators = 1", ""));
+    let why = refusal_of(&config("max_operators = 1", ""));
     assert!(
         why.contains("[appearance] model file") && why.contains("raise `max_operators`"),
         "{why}"
@@ -128,10 +123,17 @@ fn a_network_that_cannot_be_used_is_an_error_with_its_line() {
         ("deadlin_s = 1.0", "did you mean `deadline_s`?"),
         ("convention = 'osnett'", "did you mean `osnet`?"),
     ] {
-        let why = refusal(&config(line, ""));
+        let why = refusal_of(&config(line, ""));
         assert!(why.contains(message) && why.contains(&format!("| {line}\n")), "{why}");
     }
     let blind = config("", "[reidentification]\nremember_s = 1.0");
-    let why = refusal(&format!("without = ['colour']\n{blind}"));
+    let why = refusal_of(&format!("without = ['colour']\n{blind}"));
     assert!(why.contains("`[appearance]` requires colour"), "{why}");
+}
+
+/// The error that this config leads to.
+fn refusal_of(text: &str) -> String {
+    let world = World::default();
+    let built = Pipeline::builder(&world.registry()).from_toml(text);
+    built.err().expect("a refusal").to_string()
 }

@@ -40,13 +40,13 @@ fn paint(u: f64, v: f64) -> f64 {
 fn image(turned: f64, people: &[Detection]) -> GreyImage {
     GreyImage::from_fn(640, 480, |x, y| {
         let at = Point2::new(x as f64, y as f64);
-        let holds = |person: &&Detection| {
+        for person in people {
             let rect = person.rect().unwrap();
-            (rect.x..rect.right()).contains(&at.x)
+            if (rect.x..rect.right()).contains(&at.x)
                 && (rect.y..rect.y + 3.0 * rect.height).contains(&at.y)
-        };
-        if people.iter().any(|person| holds(&person)) {
-            return 230;
+            {
+                return 230;
+            }
         }
         let ray = camera().ray(at);
         let bearing = turned - ray.x.atan();
@@ -56,13 +56,13 @@ fn image(turned: f64, people: &[Detection]) -> GreyImage {
 
 /// Two people standing side by side, as a camera with this heading sees them.
 fn people(turned: f64) -> Vec<Detection> {
-    let seen = |y: f64| {
+    let people = [0.3, -0.3].map(|y| {
         let place = Rotation2::new(-turned) * Vector2::new(6.0, y);
         let mut seen = person(place.x, place.y);
         seen.position = Point3::new(place.x, place.y, 1.6);
         seen
-    };
-    vec![seen(0.3), seen(-0.3)]
+    });
+    people.to_vec()
 }
 
 fn run(config: &str, motion: impl Fn(u64) -> EgoMotion) -> Vec<FrameReport> {

@@ -104,8 +104,8 @@ fn who_is_in_the_laser_scan_alone_is_not_driven_into() {
         let report = pipeline.step(&frame).unwrap();
         let command = report.command.unwrap();
         assert_eq!(command.reason, reason, "{index}");
-        let stands = |x| report.obstacles.iter().any(|o| o.at.x == x && o.at.y == 0.15);
-        assert_eq!(stands(0.5), !laser.is_empty(), "{:?}", report.obstacles);
+        let is_seen = report.obstacles.iter().any(|o| o.at.x == 0.5 && o.at.y == 0.15);
+        assert_eq!(is_seen, !laser.is_empty(), "{:?}", report.obstacles);
         let WheelSpeeds { left, right } = command.wheels;
         assert_eq!(left + right > 1e-9, laser.is_empty(), "turning is allowed: {command:?}");
     }
@@ -127,9 +127,9 @@ fn t8_a_stall_halves_the_speed_then_stops_then_loses_the_person() {
 #[test]
 fn t8_without_frames_commands_expire_by_themselves() {
     let (_, pipeline) = driving("");
-    let at = |t_s| pipeline.command_at(frame(20, t_s).stamp).unwrap();
-    assert!(is_moving(&at(2.2)));
-    let expired = at(2.3);
+    let [moving, expired] =
+        [2.2, 2.3].map(|t_s| pipeline.command_at(frame(20, t_s).stamp).unwrap());
+    assert!(is_moving(&moving));
     assert_eq!((expired.wheels, expired.reason), (WheelSpeeds::STOP, Reason::Expired));
 }
 
@@ -228,9 +228,11 @@ fn s3_without_people_there_is_no_track_and_every_command_is_zero() {
 fn s4_of_a_crowd_so_many_are_tracked_as_the_limit_says_and_the_target_stays_or_is_lost() {
     let (world, mut pipeline) = driving("");
     let target = pipeline.step(frame(21, 2.1)).unwrap().target.unwrap();
-    let place = |i: u32| person(1.5 + 0.8 * f64::from(i / 20), -8.0 + 0.8 * f64::from(i % 20));
-    let crowd = (0..300).map(|i| scored(4.0, place(i)));
-    let all: Vec<_> = std::iter::once(scored(5.0, person(3.0, 0.0))).chain(crowd).collect();
+    let mut all = vec![scored(5.0, person(3.0, 0.0))];
+    for i in 0..300_u32 {
+        let ahead_m = 1.5 + 0.8 * f64::from(i / 20);
+        all.push(scored(4.0, person(ahead_m, -8.0 + 0.8 * f64::from(i % 20))));
+    }
     for index in 22..=40 {
         world.show(0, index, all.clone());
         let report = pipeline.step(frame(index, index as f64 * 0.1)).unwrap();

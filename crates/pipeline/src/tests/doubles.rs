@@ -286,14 +286,17 @@ impl Filter for Odd {
             "negative" => (3.0, -1.0),
             _ => (3.0, 1.0),
         };
-        let estimate = |id: &TrackId| {
+        let mut estimates = BTreeMap::new();
+        if self.config.how == "forgets" {
+            return estimates;
+        }
+        for id in &self.ids {
             let position = Point3::new(x, f64::from(id.0), 1.6);
             let person = Person { position, velocity: Vector2::zeros() };
             let covariance = SMatrix::identity() * variance;
-            (*id, Estimate::new(person, covariance, camera.upper_body(&position)))
-        };
-        let forgets = self.config.how == "forgets";
-        self.ids.iter().filter(|_| !forgets).map(estimate).collect()
+            estimates.insert(*id, Estimate::new(person, covariance, camera.upper_body(&position)));
+        }
+        estimates
     }
 
     fn stop(&mut self, id: TrackId) {
@@ -328,13 +331,13 @@ struct Drive(Config);
 
 impl Controller for Drive {
     fn command(&mut self, scene: &Scene<'_>) -> Twist {
-        let wheels = |left, right| scene.wheels.twist(WheelSpeeds { left, right });
-        match self.0.how.as_str() {
+        let wheels = match self.0.how.as_str() {
             "panic at 21" if scene.frame.index == 21 => panic!("which way?"),
-            "nan" => wheels(f64::NAN, 0.0),
+            "nan" => WheelSpeeds { left: f64::NAN, right: 0.0 },
             "panic" => panic!("which way?"),
-            _ => wheels(2.0, 4.0),
-        }
+            _ => WheelSpeeds { left: 2.0, right: 4.0 },
+        };
+        scene.wheels.twist(wheels)
     }
 
     fn stand_off_m(&self) -> Option<f64> {

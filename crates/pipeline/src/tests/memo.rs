@@ -53,10 +53,10 @@ fn texts() -> Vec<String> {
 fn what_is_shared_is_what_would_have_been_found() {
     let world = world();
     world.show(1, 7, vec![person(2.5, 0.0)]);
-    let build = || -> Vec<Pipeline> { texts().iter().map(|text| world.pipeline(text)).collect() };
-    let alone = together(&mut build());
+    let [mut lonely, mut sharing]: [Vec<Pipeline>; 2] =
+        std::array::from_fn(|_| texts().iter().map(|text| world.pipeline(text)).collect());
+    let alone = together(&mut lonely);
     let asked_alone = std::mem::take(&mut *world.asked.lock().unwrap()).len();
-    let mut sharing = build();
     sharing.iter_mut().for_each(Pipeline::share_findings);
     let shared = together(&mut sharing);
     assert_eq!(alone, shared);

@@ -58,30 +58,28 @@ fn who_is_nearest_is_chosen_even_if_seen_second() {
 
 #[test]
 fn a_nearer_person_takes_over_for_a_while_after_the_choice() {
-    // Comes into sight in this frame, and walks past with this speed, m a frame.
-    let seen_from = |frame, (ahead, aside): (f64, f64), step: f64| {
-        move |i| match i {
-            _ if i < frame => vec![tall(1.6, 4.0, 0.0)],
-            _ => vec![tall(1.6, 4.0, 0.0), tall(1.6, ahead, aside - step * f64::from(i - frame))],
-        }
-    };
-    let ends = |settings: &str, frame, place, step| {
+    let far = ride("", 3, |_| vec![tall(1.6, 4.0, 0.0)])[2].tracks[0].id.0;
+    let enrolled = format!("track = {far}\nreconsider_s = 2.0");
+    // The other person comes into sight in a frame, and walks past with a speed, m a frame.
+    for (settings, first, [ahead, aside], step, target_m, why) in [
+        ("reconsider_s = 2.0", 15, [2.0, 0.1], 0.0, 2.0, "nearer"),
+        ("reconsider_s = 2.0", 25, [2.0, 0.1], 0.0, 4.0, "too late"),
+        ("reconsider_s = 2.0", 15, [2.0, 1.0], 0.0, 4.0, "not in front"),
+        ("reconsider_s = 4.0", 8, [2.0, 1.5], 0.1, 4.0, "walks past"),
+        ("reconsider_s = 2.0", 15, [3.2, 0.1], 0.0, 4.0, "was in the image all along"),
+        ("", 15, [2.0, 0.1], 0.0, 4.0, "off by default"),
+        (&enrolled, 15, [2.0, 0.1], 0.0, 4.0, "a person who was named is kept"),
+    ] {
         let settings = format!("choose_within_deg = 20.0\n{settings}");
-        let reports = ride(&settings, 40, seen_from(frame, place, step));
+        let reports = ride(&settings, 40, |i| match i {
+            _ if i < first => vec![tall(1.6, 4.0, 0.0)],
+            _ => vec![tall(1.6, 4.0, 0.0), tall(1.6, ahead, aside - step * f64::from(i - first))],
+        });
         let last = &reports[39];
         let target = last.tracks.iter().find(|t| Some(t.id) == last.target).unwrap();
         assert_eq!(last.lock.as_ref().unwrap().state, LockState::Locked, "{settings}");
-        target.estimate.person.position.x
-    };
-    assert_eq!(ends("reconsider_s = 2.0", 15, (2.0, 0.1), 0.0), 2.0);
-    assert_eq!(ends("reconsider_s = 2.0", 25, (2.0, 0.1), 0.0), 4.0, "too late");
-    assert_eq!(ends("reconsider_s = 2.0", 15, (2.0, 1.0), 0.0), 4.0, "not in front");
-    assert_eq!(ends("reconsider_s = 4.0", 8, (2.0, 1.5), 0.1), 4.0, "walks past");
-    assert_eq!(ends("reconsider_s = 2.0", 15, (3.2, 0.1), 0.0), 4.0, "was in the image all along");
-    assert_eq!(ends("", 15, (2.0, 0.1), 0.0), 4.0, "off by default");
-    let far = ride("", 3, |_| vec![tall(1.6, 4.0, 0.0)])[2].tracks[0].id.0;
-    let enrolled = format!("track = {far}\nreconsider_s = 2.0");
-    assert_eq!(ends(&enrolled, 15, (2.0, 0.1), 0.0), 4.0, "a person who was named is kept");
+        assert_eq!(target.estimate.person.position.x, target_m, "{why}");
+    }
 }
 
 #[test]

@@ -77,11 +77,10 @@ fn appearance_says_whose_detection_it_is_where_places_do_not() {
         );
         let mut pipeline = world.pipeline(&config);
         let reports = (1..=9).map(|index| {
-            let colour = |x: usize, _| {
+            let colour = RgbImage::from_fn(640, 480, |x, _| {
                 if x < 320 || index == 9 { [200, 20, 20] } else { [20, 20, 200] }
-            };
-            let colour = Arc::new(RgbImage::from_fn(640, 480, colour));
-            let images = Images { colour: Some(colour), ..Images::default() };
+            });
+            let images = Images { colour: Some(Arc::new(colour)), ..Images::default() };
             let blank = frame(index, index as f64 * 0.1);
             let frame = Frame::new(index, blank.stamp, blank.camera, blank.motion, images);
             pipeline.step(&frame).unwrap()
@@ -166,18 +165,14 @@ fn spread_of_second(how: &str, frames: Vec<Vec<Detection>>) -> (f64, f64) {
 
 #[test]
 fn who_is_half_hidden_is_seen_aside_also_by_one_who_is_too_near_to_be_found() {
-    fn alone(y: f64) -> Vec<Detection> {
-        vec![person(4.0, y)]
-    }
-
-    let near = person(2.0, 0.0);
-    let both = |y: f64| vec![near.clone(), person(4.0, y)];
-    let seen = |how, y: f64| spread_of_second(how, vec![both(y), both(y), both(y), alone(y)]);
     let how = "occlusion.body_width_m = 0.5";
-    let off = seen("", 0.4);
-    let beside = seen(how, 1.2);
+    let [off, beside, hidden] = [("", 0.4), (how, 1.2), (how, 0.4)].map(|(how, y)| {
+        let mut moments = vec![vec![person(2.0, 0.0), person(4.0, y)]; 3];
+        moments.push(vec![person(4.0, y)]);
+        spread_of_second(how, moments)
+    });
     assert_eq!((off, beside), ((0.1, 0.1), (0.1, 0.1)));
-    let (along, across) = seen(how, 0.4);
+    let (along, across) = hidden;
     assert!((0.13..0.27).contains(&across) && along < 0.11, "{along} {across}");
 }
 
@@ -402,12 +397,11 @@ fn one_no_of_a_verifier_kills_no_track() {
 #[test]
 fn verifiers_are_not_asked_about_the_sightings_of_a_detector_that_goes_without() {
     let doubted = World::of((0..3).map(|_| vec![person(3.0, 0.3)]));
-    let started = |verify: bool| {
+    for (verify, started) in [(true, vec![]), (false, vec![1])] {
         let config = PLAIN.replace("'script'", &format!("'script'\nverify = {verify}"));
         let config = format!("{config}\n[[verifiers]]\nplugin = 'choosy'");
-        ids(&doubted.run(&config, 3, 0.1)[2])
-    };
-    assert_eq!((started(true), started(false)), (vec![], vec![1]));
+        assert_eq!(ids(&doubted.run(&config, 3, 0.1)[2]), started, "{verify}");
+    }
 }
 
 #[test]
@@ -445,9 +439,9 @@ fn nobody_starts_where_somebody_is_seen() {
 
 #[test]
 fn too_many_detections_and_tracks_are_dropped_lowest_score_first() {
-    let crowd = || (0..8).map(|i| scored(f64::from(i), person(3.0, f64::from(i) * 0.4 - 1.4)));
+    let crowd = (0..8).map(|i| scored(f64::from(i), person(3.0, f64::from(i) * 0.4 - 1.4)));
     let config = format!("merge.max_detections = 6\nmerge.max_tracks = 4\n{PLAIN}");
-    let report = World::of([crowd().collect()]).run(&config, 1, 0.1).remove(0);
+    let report = World::of([crowd.collect()]).run(&config, 1, 0.1).remove(0);
     assert_eq!(report.funnel.count("too many detections"), 2);
     assert_eq!(report.funnel.count("track: too many"), 2);
     let scores: Vec<f64> = report.tracks.iter().map(|t| t.score).collect();

@@ -23,9 +23,9 @@ pub fn front(marks: &[Mark<'_>], accuracy_name: &str, words: &Words<'_>) -> Mark
     let x = Axis::around(Scale::Log, marks.iter().map(|m| m.ms), [PLOT.left, PLOT.right]);
     let accuracies = marks.iter().map(|m| m.accuracy);
     let y = Axis::around(Scale::Linear, accuracies, [PLOT.bottom, PLOT.top]);
-    let place = |m: &Mark<'_>| Some((x.at(m.ms)?, y.at(m.accuracy)?));
-    let stairs = stairs(&unbeaten(marks), place);
-    let drawn: Vec<_> = marks.iter().filter_map(|m| Some((m, place(m)?))).collect();
+    let stairs = stairs(&unbeaten(marks), |m| Some((x.at(m.ms)?, y.at(m.accuracy)?)));
+    let drawn: Vec<_> =
+        marks.iter().filter_map(|m| Some((m, (x.at(m.ms)?, y.at(m.accuracy)?)))).collect();
     let named: Vec<_> = drawn.iter().map(|&(m, at)| (m.name, at)).collect();
     let body = html! {
         (axes(PLOT, &x, &y, ["milliseconds per frame (median, log scale)", accuracy_name]))

@@ -17,12 +17,11 @@ fn attributes<'a>(svg: &'a str, name: &str) -> Vec<&'a str> {
 
 /// Returns all positions that are drawn: x and y by the attributes that hold them.
 fn places(svg: &str) -> (Vec<f64>, Vec<f64>) {
-    let of = |names: &[&str]| -> Vec<f64> {
-        let texts = names.iter().flat_map(|n| attributes(svg, n));
-        texts.map(|t| t.parse().expect("a number")).collect()
-    };
-    let mut xs = of(&["x", "x1", "x2", "cx"]);
-    let mut ys = of(&["y", "y1", "y2", "cy"]);
+    let [mut xs, mut ys] =
+        [["x", "x1", "x2", "cx"], ["y", "y1", "y2", "cy"]].map(|names| -> Vec<f64> {
+            let texts = names.iter().flat_map(|n| attributes(svg, n));
+            texts.map(|t| t.parse().expect("a number")).collect()
+        });
     for pair in attributes(svg, "points").iter().flat_map(|p| p.split_whitespace()) {
         let (x, y) = pair.split_once(',').expect("a pair");
         xs.push(x.parse().expect("a number"));
@@ -121,10 +120,9 @@ fn ticks_are_round() {
 
 #[test]
 fn series_differ_by_more_than_colour() {
-    let look = |i: usize| (mark(i, (0.0, 0.0), 1.0).into_string(), dashes(i));
-    for i in 0..SERIES {
-        for j in 0..i {
-            assert_ne!(look(i), look(j), "{i} and {j}");
-        }
+    let looks: Vec<_> =
+        (0..SERIES).map(|i| (mark(i, (0.0, 0.0), 1.0).into_string(), dashes(i))).collect();
+    for (i, look) in looks.iter().enumerate() {
+        assert!(!looks[..i].contains(look), "{i}: {look:?}");
     }
 }

@@ -315,11 +315,14 @@ mod tests {
 
     #[test]
     fn only_a_pipeline_with_a_match_is_the_best_on_a_log() {
-        let has_star =
-            |value, columns| log_cell(Some(value), 0.0, columns).into_string().contains('★');
-        assert!(!has_star(0.0, 3), "no pipeline has a match");
-        assert!(has_star(0.001, 3));
-        assert!(!has_star(0.5, 1), "no rival");
+        for (value, columns, is_best, why) in [
+            (0.0, 3, false, "no pipeline has a match"),
+            (0.001, 3, true, "the best"),
+            (0.5, 1, false, "no rival"),
+        ] {
+            let cell = log_cell(Some(value), 0.0, columns).into_string();
+            assert_eq!(cell.contains('★'), is_best, "{why}");
+        }
     }
 
     #[test]

@@ -120,51 +120,51 @@ impl Page<'_> {
     }
 
     fn sections(&self) -> Vec<Section> {
-        let section = |anchor, heading, body| Some(Section { anchor, heading, body });
-        let some = |anchor, heading, body: Option<Markup>| {
-            body.map(|body| Section { anchor, heading, body })
-        };
-        let speed = || section("speed", "Accuracy and time", self.speed());
         // The plot comes first if there is one; the remark that there is none does not.
         let (first, later) = match self.timings {
-            Some(_) => (speed(), None),
-            None => (None, speed()),
+            Some(_) => (Some(self.speed()), None),
+            None => (None, Some(self.speed())),
         };
-        [
-            first,
-            section(
-                "results",
-                "Results",
-                html! { (self.headline()) @if let Some(note) = self.constant_scores() { (note) } },
-            ),
-            some("failed", "Failed and skipped", self.failed()),
-            some("missed", "Missed people, and why", self.missed()),
-            some("repairs", "Where work pays", self.repairs()),
-            some("pairs", "Pipelines side by side", self.pairs()),
-            later,
-            some("miss-rate", "Miss rate", self.miss_rates()),
-            some("floor", "Seen from above", self.plans()),
-            some("funnel", "Why candidates were dropped", self.funnels()),
-            some("events", "What happened when", self.events()),
-            some("tasks", "All tasks", self.all_tasks()),
-            section("reading", "How to read this", self.explain()),
-            some("inputs", "Versions and hashes", self.inputs()),
-        ]
-        .into_iter()
-        .flatten()
-        .collect()
+        let results =
+            html! { (self.headline()) @if let Some(note) = self.constant_scores() { (note) } };
+        let sections = [
+            ("speed", "Accuracy and time", first),
+            ("results", "Results", Some(results)),
+            ("failed", "Failed and skipped", self.failed()),
+            ("missed", "Missed people, and why", self.missed()),
+            ("repairs", "Where work pays", self.repairs()),
+            ("pairs", "Pipelines side by side", self.pairs()),
+            ("speed", "Accuracy and time", later),
+            ("miss-rate", "Miss rate", self.miss_rates()),
+            ("floor", "Seen from above", self.plans()),
+            ("funnel", "Why candidates were dropped", self.funnels()),
+            ("events", "What happened when", self.events()),
+            ("tasks", "All tasks", self.all_tasks()),
+            ("reading", "How to read this", Some(self.explain())),
+            ("inputs", "Versions and hashes", self.inputs()),
+        ];
+        let shown = sections.into_iter().filter_map(|(anchor, heading, body)| {
+            body.map(|body| Section { anchor, heading, body })
+        });
+        shown.collect()
     }
 
     fn facts(&self) -> Markup {
-        let count =
-            |is: fn(&Outcome) -> bool| self.view.tasks.iter().filter(|t| is(&t.outcome)).count();
-        let failed = count(|o| matches!(o, Outcome::Failed { .. }));
-        let skipped = count(|o| matches!(o, Outcome::Skipped { .. }));
+        let mut done = 0;
+        let mut failed = 0;
+        let mut skipped = 0;
+        for task in &self.view.tasks {
+            match task.outcome {
+                Outcome::Done => done += 1,
+                Outcome::Failed { .. } => failed += 1,
+                Outcome::Skipped { .. } => skipped += 1,
+            }
+        }
         html! {
             (counted(self.view.pipelines.len(), "pipeline")) " on "
             (counted(self.view.logs.len(), "log")) ", "
             (counted(self.view.tasks.len(), "task")) ": "
-            (count(|o| *o == Outcome::Done)) " done"
+            (done) " done"
             @if failed > 0 { ", " strong class="bad" { (failed) " failed" } }
             @if skipped > 0 { ", " (skipped) " skipped" }
             ". Tagalong " (self.view.version) "."

@@ -190,24 +190,11 @@ impl Page<'_> {
             (column("Pipeline", None))
             @for id in people { (column(&format!("Person {id}"), None)) }
         };
-        let fate = |pipeline: &str, id: i64| {
-            let miss = missed.iter().find(|(t, m)| t.pipeline == pipeline && m.person == id);
-            match miss {
-                Some((task, miss)) => html! {
-                    strong class="bad" { "✕ " (miss.test.as_deref().unwrap_or(NO_CANDIDATE)) }
-                    @if let Some(why) = miss.test.as_ref().and_then(|test| task.reasons.get(test)) { span class="why line" { (why) } }
-                },
-                None => match track_on(moment, pipeline, id) {
-                    Some(track) => html! { "● track " (track) },
-                    None => html! { "●" },
-                },
-            }
-        };
         let body = html! {
             @for p in self.view.pipelines.iter().filter(|p| self.view.drawn(p, &moment.log).is_some()) {
                 tr {
                     th scope="row" { (key(self.series(p), p)) }
-                    @for id in people { td { (fate(p, *id)) } }
+                    @for id in people { td { (fate_of(moment, missed, p, *id)) } }
                 }
             }
         };
@@ -218,6 +205,26 @@ impl Page<'_> {
             &head,
             &body,
         )
+    }
+}
+
+/// Whether a pipeline missed a person, and why, or as which track it has the person.
+fn fate_of(
+    moment: &Moment,
+    missed: &[(&TaskResult, &MissedPerson)],
+    pipeline: &str,
+    id: i64,
+) -> Markup {
+    let miss = missed.iter().find(|(t, m)| t.pipeline == pipeline && m.person == id);
+    match miss {
+        Some((task, miss)) => html! {
+            strong class="bad" { "✕ " (miss.test.as_deref().unwrap_or(NO_CANDIDATE)) }
+            @if let Some(why) = miss.test.as_ref().and_then(|test| task.reasons.get(test)) { span class="why line" { (why) } }
+        },
+        None => match track_on(moment, pipeline, id) {
+            Some(track) => html! { "● track " (track) },
+            None => html! { "●" },
+        },
     }
 }
 

@@ -35,8 +35,7 @@ impl Page<'_> {
 
     fn repair_row(&self, task: &TaskResult) -> Markup {
         let hota = task.image.or(task.metres).and_then(|scores| scores.hota);
-        let gain = |row: &Repaired| Some(row.hota? - hota?);
-        let largest = task.repairs.iter().filter_map(gain).fold(0.0, f64::max);
+        let largest = task.repairs.iter().filter_map(|row| gain_of(row, hota)).fold(0.0, f64::max);
         html! {
             tr {
                 th scope="row" { (key(self.series(&task.pipeline), &task.pipeline)) }
@@ -44,7 +43,7 @@ impl Page<'_> {
                 (optional_cell(hota, 3))
                 @for repair in Repair::ALL {
                     @let row = task.repairs.iter().find(|row| row.repair == repair);
-                    @match row.and_then(gain) {
+                    @match row.and_then(|row| gain_of(row, hota)) {
                         Some(gain) if gain > 0.0 && gain == largest => {
                             (cell(gain, &html! { strong { (signed(gain, 3)) } }))
                         }
@@ -55,4 +54,9 @@ impl Page<'_> {
             }
         }
     }
+}
+
+/// The gain of HOTA by a repair.
+fn gain_of(row: &Repaired, hota: Option<f64>) -> Option<f64> {
+    Some(row.hota? - hota?)
 }

@@ -204,7 +204,7 @@ fn moments(tasks: &[TaskResult]) -> Vec<Moment> {
     }
 
     let logs: BTreeSet<&str> = tasks.iter().map(|task| task.log.as_str()).collect();
-    let moment = |log: &str| Moment {
+    let moments = logs.into_iter().map(|log| Moment {
         log: log.to_owned(),
         frame: MOMENT,
         t_s: 4.0,
@@ -212,8 +212,8 @@ fn moments(tasks: &[TaskResult]) -> Vec<Moment> {
         image_jpeg_base64: IMAGE.into(),
         people: vec![(1, [210.0, 85.0, 64.0, 64.0]), (2, [392.0, 98.0, 60.0, 60.0])],
         tracks: tasks.iter().filter(|task| task.log == log).map(track).collect(),
-    };
-    logs.into_iter().map(moment).collect()
+    });
+    moments.collect()
 }
 
 fn events(wobble: &mut Wobble) -> Vec<EventRow> {
@@ -224,7 +224,7 @@ fn events(wobble: &mut Wobble) -> Vec<EventRow> {
         ("false-track", "Track 12 is where nobody is."),
         ("wrong-person", "Track 11, which began with person 1, is on person 2."),
     ];
-    let event = |(i, (kind, text)): (usize, (&str, &str))| {
+    let events = told.into_iter().enumerate().map(|(i, (kind, text))| {
         let t_s = wobble.around(4.0 + 5.0 * i as f64, 2.0);
         EventRow {
             frame: (15.0 * t_s) as u64 + 1,
@@ -235,8 +235,8 @@ fn events(wobble: &mut Wobble) -> Vec<EventRow> {
             text: text.into(),
             picture_png_base64: Some(PICTURE.into()),
         }
-    };
-    told.into_iter().enumerate().map(event).collect()
+    });
+    events.collect()
 }
 
 /// Replaces the result of one task by another outcome, so that the page has a task to report.

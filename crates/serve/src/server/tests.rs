@@ -292,8 +292,8 @@ fn a_slow_client_gets_its_whole_answer() {
 
 #[test]
 fn requests_are_answered_where_no_thread_can_start() {
-    let refused: StartThread = |_| Err(io::Error::other("no thread"));
-    let running = Running::with(open_access(Changes::Refused), refused);
+    let running =
+        Running::with(open_access(Changes::Refused), |_| Err(io::Error::other("no thread")));
     for _ in 0..3 {
         assert_eq!(running.ask("GET", "a", &[]).0, 200);
         assert_eq!(running.ask("GET", "panic", &[]).0, 0, "no answer, and no end of the server");

@@ -45,13 +45,15 @@ impl People {
         if self.numbers.is_empty() && self.given_up.is_empty() {
             return;
         }
-        let number = |id: &mut TrackId| *id = self.numbers.get(id).copied().unwrap_or(*id);
-        report.tracks.iter_mut().for_each(|track| number(&mut track.id));
-        report.nis.iter_mut().for_each(|(id, ..)| number(id));
-        for candidate in &mut report.candidates {
-            if let Fate::Matched(id) | Fate::Started(id) = &mut candidate.fate {
-                number(id);
-            }
+        let tracks = report.tracks.iter_mut().map(|track| &mut track.id);
+        let measured = report.nis.iter_mut().map(|(id, ..)| id);
+        let fates =
+            report.candidates.iter_mut().filter_map(|candidate| match &mut candidate.fate {
+                Fate::Matched(id) | Fate::Started(id) => Some(id),
+                _ => None,
+            });
+        for id in tracks.chain(measured).chain(fates) {
+            *id = self.numbers.get(id).copied().unwrap_or(*id);
         }
         report.ended.extend(self.given_up);
     }
@@ -140,19 +142,17 @@ impl Reidentifier {
         }
         let seen = detections.iter().map(|detection| self.describe(frame, detection));
         let seen = seen.collect::<Result<Vec<Option<Appearance>>>>()?;
-        let ratio = |known: Option<&Identity>, seen: &Option<Appearance>| {
-            let difference =
-                known.zip(seen.as_ref()).and_then(|(known, seen)| known.difference(seen));
-            let most = self.settings.max_difference;
-            difference.map_or(0.0, |difference| weight * evidence.log_ratio(difference, most))
-        };
-        Ok(tracks
-            .iter()
-            .map(|track| {
-                let known = self.tracks.get(&track.id);
-                seen.iter().map(|seen| ratio(known, seen)).collect()
-            })
-            .collect())
+        let most = self.settings.max_difference;
+        let mut ratios = Vec::new();
+        for track in tracks {
+            let known = self.tracks.get(&track.id);
+            let of_track = seen.iter().map(|seen| {
+                let difference = known?.difference(seen.as_ref()?)?;
+                Some(weight * evidence.log_ratio(difference, most))
+            });
+            ratios.push(of_track.map(|ratio| ratio.unwrap_or(0.0)).collect());
+        }
+        Ok(ratios)
     }
 
     /// Returns the appearance of a detection; `None` without a box that shows one.
@@ -198,8 +198,9 @@ impl Reidentifier {
     /// Notes new tracks, and which tracks may change over.
     fn note_rivals(&mut self, tracks: &[Track], frame: u64) {
         for track in tracks {
-            let new = || Identity::new(track.id, place(track), frame);
-            self.tracks.entry(track.id).or_insert_with(new);
+            self.tracks
+                .entry(track.id)
+                .or_insert_with(|| Identity::new(track.id, place(track), frame));
         }
         for (index, a) in tracks.iter().enumerate() {
             for b in &tracks[index + 1..] {
@@ -213,9 +214,9 @@ impl Reidentifier {
     }
 
     fn add_rivals(&mut self, a: TrackId, b: TrackId, frame: u64) {
-        let number = |id| self.tracks.get(&id).map(|identity| identity.person.number);
-        let (Some(first), Some(second)) = (number(a), number(b)) else { return };
-        for (id, rival) in [(a, second), (b, first)] {
+        let both = (self.tracks.get(&a), self.tracks.get(&b));
+        let (Some(first), Some(second)) = both else { return };
+        for (id, rival) in [(a, second.person.number), (b, first.person.number)] {
             if let Some(identity) = self.tracks.get_mut(&id) {
                 // Both directions, because either track may have taken the other's detections.
                 identity.rivals.insert(rival);
@@ -231,14 +232,13 @@ impl Reidentifier {
     /// Adds the appearances of this frame of all tracks that are seen, and near to no other.
     fn add_appearances(&mut self, frame: &Frame, tracks: &[Track]) -> Result<()> {
         for track in tracks.iter().filter(|track| track.seen && !track.occluded) {
-            let is_near = |other: &Track| {
-                other.id != track.id && (place(other) - place(track)).norm() < self.settings.alone_m
-            };
             let covered = tracks.iter().any(|other| other.seen && covers(other, track));
             let Some(identity) = self.tracks.get_mut(&track.id) else { continue };
             // The position counts also where the appearance does not: it bounds how far a person can walk.
             identity.person.see(place(track), track.velocity);
-            if covered || tracks.iter().any(is_near) {
+            let mut others = tracks.iter().filter(|other| other.id != track.id);
+            if covered || others.any(|it| (place(it) - place(track)).norm() < self.settings.alone_m)
+            {
                 continue;
             }
             let appearance = self.describer.of(&track.estimate, frame)?;

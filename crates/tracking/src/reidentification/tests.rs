@@ -47,8 +47,8 @@ impl Scene {
         let mut numbers = Vec::new();
         for _ in 0..frames {
             let people = self.stage.update(image, &EgoMotion::at_rest(DT_S), tracks).unwrap();
-            let number = |id| people.numbers.get(id).unwrap_or(id).0;
-            numbers = tracks.iter().map(|track| number(&track.id)).collect();
+            let ids = tracks.iter().map(|track| people.numbers.get(&track.id).unwrap_or(&track.id));
+            numbers = ids.map(|id| id.0).collect();
         }
         numbers
     }
@@ -256,12 +256,11 @@ fn a_detection_that_looks_like_the_person_of_a_track_speaks_for_it() {
     let tracks = [track(1, 0.8, 1.7), track(2, -0.8, 1.7)];
     scene.show(3, &frame(RED, BLUE), &tracks);
     let detections = [detection(0.8), detection(-0.8)];
-    let compare = |scene: &Scene, image: &Frame| {
-        scene.stage.compare(image, &tracks, &detections, false).unwrap()
-    };
-    assert!(compare(&scene, &frame(RED, BLUE)).is_empty(), "positions alone decide by default");
+    let off = scene.stage.compare(&frame(RED, BLUE), &tracks, &detections, false).unwrap();
+    assert!(off.is_empty(), "positions alone decide by default");
     scene.stage.settings.association_weight = 5.0;
-    let [same, changed] = [frame(RED, BLUE), frame(BLUE, RED)].map(|image| compare(&scene, &image));
+    let [same, changed] = [frame(RED, BLUE), frame(BLUE, RED)]
+        .map(|image| scene.stage.compare(&image, &tracks, &detections, false).unwrap());
     assert!(same[0][0] > 4.9 && same[1][1] > 4.9, "{same:?}");
     assert!(same[0][1] < 0.0 && same[1][0] < 0.0, "{same:?}");
     assert!(same.iter().flatten().all(|ratio| ratio.abs() <= 5.0), "{same:?}");
@@ -328,17 +327,18 @@ fn a_person_who_walked_away_is_not_back_at_once() {
             .estimate
             .with_person(Person { velocity: Vector2::new(0.0, 2.0), ..*track(1, 0.8, 1.6) }),
     );
-    let number_of_next = |max_acceleration_mps2: f64, pause: usize| {
+    for (max_acceleration_mps2, pause, number, why) in [
+        (1000.0, 10, 1, "nothing keeps it from turning"),
+        (1.5, 10, 2, "it would have to turn within a second"),
+        (1.5, 40, 1, "it has had the time"),
+    ] {
         let mut scene = Scene::new();
         scene.stage.settings.max_acceleration_mps2 = max_acceleration_mps2;
         let image = frame(RED, BLUE);
         scene.show(30, &image, std::slice::from_ref(&walker));
         scene.show(pause, &image, &[]);
-        scene.show(15, &image, &[track(2, 0.8, 1.6)])[0]
-    };
-    assert_eq!(number_of_next(1000.0, 10), 1);
-    assert_eq!(number_of_next(1.5, 10), 2, "it would have to turn within a second");
-    assert_eq!(number_of_next(1.5, 40), 1, "it has had the time");
+        assert_eq!(scene.show(15, &image, &[track(2, 0.8, 1.6)]), [number], "{why}");
+    }
 }
 
 /// The appearance of the track shows only after a while.
@@ -362,10 +362,10 @@ fn a_single_track_and_detection_are_compared_where_new_people_count() {
     let mut scene = Scene::new();
     scene.show(30, &frame(RED, BLUE), &[track(1, 0.8, 1.7)]);
     scene.stage.settings.association_weight = 1.0;
-    let ratios = |with_births: bool| {
+    let [without, with_births] = [false, true].map(|with_births| {
         let image = frame(RED, BLUE);
         scene.stage.compare(&image, &[track(1, 0.8, 1.7)], &[detection(0.8)], with_births).unwrap()
-    };
-    assert!(ratios(false).is_empty());
-    assert!(ratios(true)[0][0] > 0.5);
+    });
+    assert!(without.is_empty());
+    assert!(with_births[0][0] > 0.5);
 }

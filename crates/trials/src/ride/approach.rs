@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Serialize;
 use tagalong_core::Reason;
 use tagalong_pipeline::FrameReport;
-use tagalong_sim::{ApproachBy, ApproachInView, Event, Scene, ScheduledFault};
+use tagalong_sim::{ApproachBy, Event, Scene, ScheduledFault};
 
 use super::{Ride, Tick, Witness};
 use crate::SimulatedFrame;
@@ -182,16 +182,8 @@ impl ApproachJudge {
     pub fn judge(&self, scene: &Scene, ride: &Ride) -> Option<Approached> {
         let settings = scene.approach.as_ref()?;
         let first = ride.ticks.iter().find_map(|tick| Some((tick, tick.approach?)));
-        let coming = || ride.ticks.iter().filter(|tick| tick.approach.is_some());
-        let contact = |moves: bool| {
-            let found = ride.ticks.iter().find_map(|tick| {
-                (self.moves(tick) == moves)
-                    .then(|| touched(tick))
-                    .flatten()
-                    .map(|with| (tick, with))
-            });
-            found.map(|(tick, with)| contact_at(ride, tick, with))
-        };
+        let coming = ride.ticks.iter().filter(|tick| tick.approach.is_some());
+        let moving: Vec<&Tick> = coming.filter(|tick| self.moves(tick)).collect();
         let near = self.near(&ride.ticks);
         Some(Approached {
             seed: ride.seed,
@@ -205,14 +197,20 @@ impl ApproachJudge {
             laser: scene.laser.is_some(),
             faults: scene.scheduled_faults(),
             time_s: ride.ticks.last().map_or(0.0, |tick| tick.at_s),
-            moved: coming().any(|tick| self.moves(tick)),
+            moved: !moving.is_empty(),
             reason: first.and_then(|(tick, _)| tick.reason.map(Reason::name)),
-            contact: contact(true),
-            touched: contact(false),
-            room_m: least_room(coming().filter(|tick| self.moves(tick))),
+            contact: self.first_contact(ride, true),
+            touched: self.first_contact(ride, false),
+            room_m: least_room(moving.into_iter()),
             came_near: near.is_some(),
             stopping_s: near.and_then(|at| self.stopping_s(&ride.ticks[at..])),
         })
+    }
+
+    /// The first contact while the robot moves, or while it stands.
+    fn first_contact(&self, ride: &Ride, moves: bool) -> Option<Contact> {
+        let mut ticks = ride.ticks.iter().filter(|tick| self.moves(tick) == moves);
+        ticks.find_map(|tick| Some(contact_at(ride, tick, touched(tick)?)))
     }
 
     /// Returns true if the robot moves, forward, backward or by a turn.
@@ -257,15 +255,14 @@ fn touched(tick: &Tick) -> Option<Touched> {
 fn contact_at(ride: &Ride, tick: &Tick, with: Touched) -> Contact {
     let recent =
         ride.in_view.iter().filter(|(at_s, _)| (0.0..=SEEN_WITHIN_S).contains(&(tick.at_s - at_s)));
-    let saw = |by: fn(&ApproachInView) -> bool| recent.clone().any(|(_, seen)| by(seen));
     Contact {
         at_s: tick.at_s,
         with,
         speed_mps: tick.speed_mps,
         turn_rate: tick.turn_rate,
         bearing_deg: tick.approach.map(|state| state.bearing_rad.to_degrees()),
-        camera_saw: saw(|seen| seen.camera),
-        laser_saw: saw(|seen| seen.laser),
+        camera_saw: recent.clone().any(|(_, seen)| seen.camera),
+        laser_saw: recent.clone().any(|(_, seen)| seen.laser),
         reason: tick.reason.map(Reason::name),
     }
 }
@@ -323,7 +320,7 @@ impl Witness for ApproachWatch<'_> {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_sim::{ApproachSettings, ApproachState, Clearance};
+    use tagalong_sim::{ApproachInView, ApproachSettings, ApproachState, Clearance};
 
     use super::*;
 

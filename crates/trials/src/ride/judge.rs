@@ -146,22 +146,17 @@ impl RideJudge {
     /// Judges a ride after the first person of the scene.
     pub fn judge(&self, ride: &Ride) -> Ridden {
         let looks = self.looks(ride);
-        let sum = |counts: &dyn Fn(&JudgedFrame) -> bool| -> f64 {
-            looks.iter().filter(|look| counts(look)).fold(0.0, |sum, look| sum + look.dt_s)
-        };
-        let slow = |l: &JudgedFrame| {
-            l.whom == Whom::Right && l.speed_mps.is_some_and(|mps| mps < self.slow_mps)
-        };
-        let near = |l: &JudgedFrame| match (l.range_m, ride.stand_off_m) {
+        // Distance to the person counts only while they are slow enough to be kept up with.
+        let slow: Vec<&JudgedFrame> = looks.iter().filter(|look| self.is_slow(look)).collect();
+        let slow_s = seconds_of(slow.iter().copied());
+        let kept = slow.iter().copied().filter(|look| match (look.range_m, ride.stand_off_m) {
             (Some(range_m), Some(stand_off_m)) => (range_m - stand_off_m).abs() <= self.off_m,
             _ => false,
-        };
-        let slow_s = sum(&slow);
-        // Distance to the person counts only while they are slow enough to be kept up with.
-        let slowly = looks.iter().filter(|look| slow(look));
-        let farther = slowly.filter_map(|l| Some(l.dt_s * (l.range_m? - ride.stand_off_m?)));
+        });
+        let farther = slow.iter().filter_map(|l| Some(l.dt_s * (l.range_m? - ride.stand_off_m?)));
         let farther_ms: f64 = farther.sum();
-        let moving = || ride.ticks.iter().filter(|tick| tick.speed_mps.abs() > MOVES_MPS);
+        let moving: Vec<&Tick> =
+            ride.ticks.iter().filter(|tick| tick.speed_mps.abs() > MOVES_MPS).collect();
         let episodes = episodes(&looks);
         let first_s = looks.first().map_or(0.0, |look| look.at_s);
         let longest_wrong_s = longest(&looks, |look| look.whom == Whom::Wrong);
@@ -174,22 +169,27 @@ impl RideJudge {
             kept: keeps_track && !stays_behind,
             never_moved,
             reasons: reasons(&ride.ticks),
-            time_s: sum(&|_| true),
-            in_view_s: sum(&|look| look.in_view),
-            right_s: sum(&|look| look.whom == Whom::Right),
-            wrong_s: sum(&|look| look.whom == Whom::Wrong),
+            time_s: seconds_of(&looks),
+            in_view_s: seconds_of(looks.iter().filter(|look| look.in_view)),
+            right_s: seconds_of(looks.iter().filter(|look| look.whom == Whom::Right)),
+            wrong_s: seconds_of(looks.iter().filter(|look| look.whom == Whom::Wrong)),
             longest_wrong_s,
             slow_s,
-            distance_kept_s: sum(&|look| slow(look) && near(look)),
+            distance_kept_s: seconds_of(kept),
             farther_m: (slow_s > 0.0).then(|| farther_ms / slow_s),
             episodes,
-            clearance_people_m: least(moving().map(|tick| tick.clearance.people_m)),
-            clearance_things_m: least(moving().map(|tick| tick.clearance.things_m)),
-            nearest_s: nearest_s(moving()).map(|at_s| (at_s - first_s).max(0.0)),
+            clearance_people_m: least(moving.iter().map(|tick| tick.clearance.people_m)),
+            clearance_things_m: least(moving.iter().map(|tick| tick.clearance.things_m)),
+            nearest_s: nearest_s(moving.into_iter()).map(|at_s| (at_s - first_s).max(0.0)),
             jerk_mps3: jerk(&ride.ticks),
             crowd: CrowdMeasures::of(&ride.ticks),
             likeness: self.likeness(ride),
         }
+    }
+
+    /// Whether the right person is followed, and is slow enough to be kept up with.
+    fn is_slow(&self, look: &JudgedFrame) -> bool {
+        look.whom == Whom::Right && look.speed_mps.is_some_and(|mps| mps < self.slow_mps)
     }
 
     /// Returns true if a person that came back into view was found in time; `None` if the person
@@ -269,18 +269,21 @@ impl RideJudge {
     /// Returns true if a track is on the person to follow.
     fn is_of(&self, track: &Track, moment: &Moment) -> bool {
         let place = track.estimate.person.position.xy();
-        let off = |truth: &&Truth| (truth.head_in_robot.xy() - place).norm();
-        let nearest = moment.truth.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
-        nearest.is_some_and(|truth| truth.id == WHOM && off(&truth) <= self.same_m)
+        let off = moment.truth.iter().map(|of| (of.id, (of.head_in_robot.xy() - place).norm()));
+        let nearest = off.min_by(|a, b| a.1.total_cmp(&b.1));
+        nearest.is_some_and(|(id, off_m)| id == WHOM && off_m <= self.same_m)
     }
 
     fn likeness(&self, ride: &Ride) -> Vec<(Likeness, bool)> {
         let frames = ride.moments.iter().zip(&ride.reports);
         frames
             .flat_map(|(moment, report): (&Moment, &FrameReport)| -> Vec<(Likeness, bool)> {
-                let track = |id| report.tracks.iter().find(|track| track.id == id);
                 let likeness = report.lock.iter().flat_map(|lock| &lock.likeness);
-                likeness.filter_map(|l| Some((*l, self.is_of(track(l.track)?, moment)))).collect()
+                let judged = likeness.filter_map(|like| {
+                    let track = report.tracks.iter().find(|track| track.id == like.track)?;
+                    Some((*like, self.is_of(track, moment)))
+                });
+                judged.collect()
             })
             .collect()
     }
@@ -297,12 +300,17 @@ fn place(moment: &Moment) -> Option<Point2<f64>> {
 
 /// Speed over ground around a frame, m/s.
 fn speed(places: &[Option<Point2<f64>>], seconds: &[f64], at: usize) -> Option<f64> {
-    let near = |other: &usize| (seconds[*other] - seconds[at]).abs() <= 0.5 * SPEED_S;
-    let first = (0..=at).rev().take_while(near).last()?;
-    let last = (at..seconds.len()).take_while(near).last()?;
+    let apart_s: Vec<f64> = seconds.iter().map(|other| (other - seconds[at]).abs()).collect();
+    let first = (0..=at).rev().take_while(|other| apart_s[*other] <= 0.5 * SPEED_S).last()?;
+    let last = (at..seconds.len()).take_while(|other| apart_s[*other] <= 0.5 * SPEED_S).last()?;
     let way: Vector2<f64> = places[last]? - places[first]?;
     let time_s = seconds[last] - seconds[first];
     (time_s > 0.0).then(|| way.norm() / time_s)
+}
+
+/// The time of some of the frames, s.
+fn seconds_of<'f>(looks: impl IntoIterator<Item = &'f JudgedFrame>) -> f64 {
+    looks.into_iter().fold(0.0, |sum, look| sum + look.dt_s)
 }
 
 /// Times without the person, from the first time with them on.

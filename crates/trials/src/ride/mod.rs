@@ -167,8 +167,6 @@ impl Ride {
             faults: draw.simulation().faults().to_vec(),
         };
         let mut enable = StuckEnable::of(&ride.faults);
-        let failed =
-            |error| TrialError::Step { pipeline: contender.name.clone(), seed: scene.seed, error };
         // Time at which the last frame that led to a command was handed over.
         let mut framed = Stamp::default();
         while let Some(simulated) =
@@ -184,8 +182,12 @@ impl Ride {
             }
             // Of the processor: a busy machine must not change a table.
             let before = ThreadTime::now();
-            let report = pipeline.step(&simulated.frame).map_err(failed)?;
+            let report = pipeline.step(&simulated.frame);
             ride.took_ms.push(before.elapsed().as_secs_f64() * 1e3);
+            let report = report.map_err(|error| {
+                let pipeline = contender.name.clone();
+                TrialError::Step { pipeline, seed: scene.seed, error }
+            })?;
             // Between frames `command_at` steers; this is the fresh command.
             if let Some(command) = report.command {
                 framed = ride.now();

@@ -22,8 +22,7 @@ impl Contender {
     /// [`TrialError::Config`] for a config that is no TOML, and where no registered detector takes
     /// positions.
     pub fn told(&self, registry: &Registry) -> Result<Self, TrialError> {
-        let wrong = |error: toml::de::Error| TrialError::Config(format!("{}: {error}", self.name));
-        let mut config: Table = self.config.parse().map_err(wrong)?;
+        let mut config = self.table_of(&self.config)?;
         let Some((plugin, offer)) = registry.all_recorded().next() else {
             let why = "no registered detector takes the positions that a pipeline is told";
             return Err(TrialError::Config(why.to_owned()));
@@ -31,13 +30,18 @@ impl Contender {
         let mut detector = Table::new();
         detector.insert("plugin".to_owned(), plugin.into());
         detector.insert("roles".to_owned(), vec!["discover"].into());
-        let settings: Table = offer.known_positions.parse().map_err(wrong)?;
+        let settings = self.table_of(offer.known_positions)?;
         detector.insert("config".to_owned(), settings.into());
         config.insert("detectors".to_owned(), vec![detector].into());
         // Cameras that a detector suits are no matter of the positions that are told.
         config.remove("suits");
         let config = config.to_string();
         Ok(Self { name: format!("{}-told", self.name), config, ..self.clone() })
+    }
+
+    /// Reads TOML; an error names this contender.
+    fn table_of(&self, text: &str) -> Result<Table, TrialError> {
+        text.parse::<Table>().map_err(|error| TrialError::Config(format!("{}: {error}", self.name)))
     }
 }
 
@@ -82,9 +86,8 @@ fn track_of_target(simulated: &SimulatedFrame, report: &FrameReport) -> Option<T
     if !told.iter().any(|one| one.head == Some(target)) {
         return None;
     }
-    let off_m =
-        |track: &tagalong_core::Track| (track.estimate.person.position.xy() - target.xy()).norm();
     let seen = report.tracks.iter().filter(|track| track.seen);
-    let nearest = seen.min_by(|a, b| off_m(a).total_cmp(&off_m(b)))?;
-    (off_m(nearest) < SAME_M).then_some(nearest.id)
+    let off = seen.map(|it| (it.id, (it.estimate.person.position.xy() - target.xy()).norm()));
+    let (id, off_m) = off.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    (off_m < SAME_M).then_some(id)
 }

@@ -207,11 +207,17 @@ fn strip_legend() -> Markup {
     }
 }
 
+/// Buttons of the time line: their ids, signs and names.
+const BUTTONS: [[&str; 3]; 5] = [
+    ["before", "|◂", "Previous event"],
+    ["back", "◂", "One frame back"],
+    ["play", "▶", "Play"],
+    ["ahead", "▸", "One frame ahead"],
+    ["next", "▸|", "Next event"],
+];
+
 /// Renders the controls, which stay in view.
 fn time_line(names: &[&str]) -> Markup {
-    let button = |id: &str, sign: &str, name: &str| {
-        html! { button type="button" id=(id) aria-label=(name) title=(name) { (sign) } }
-    };
     html! {
         section class="time" aria-label="Time line" {
             div class="strips" aria-hidden="true" {
@@ -223,11 +229,9 @@ fn time_line(names: &[&str]) -> Markup {
             (strip_legend())
             input type="range" id="frame" min="0" max="0" value="0" step="1" aria-label="Frame";
             div class="controls" {
-                (button("before", "|◂", "Previous event"))
-                (button("back", "◂", "One frame back"))
-                (button("play", "▶", "Play"))
-                (button("ahead", "▸", "One frame ahead"))
-                (button("next", "▸|", "Next event"))
+                @for [id, sign, name] in BUTTONS {
+                    button type="button" id=(id) aria-label=(name) title=(name) { (sign) }
+                }
                 output id="clock" for="frame" {}
                 label id="speed-label" { "Speed " select id="speed" {
                     option value="0.25" { "¼" } option value="0.5" { "½" }

@@ -300,13 +300,16 @@ mod tests {
         let systems = ("systems", "use crate::{laser, stereo};");
         let laser = ("laser", "use crate::{Lab, forms};");
         let stereo = ("stereo/mod", "use crate::forms::Forms;\nuse crate::Lab;");
-        let files = |lab, forms| circle(&[lib, main, systems, laser, stereo, lab, forms]);
-        let lab = ("lab", "");
-        assert!(files(lab, ("forms", "use crate::lab::Lab;")).is_empty());
-        let knows = ("forms", "use crate::{laser, stereo};");
-        assert_eq!(files(lab, knows), [["forms", "laser", "stereo"]]);
-        let knows_all = ("lab", "use crate::SYSTEMS;");
-        assert_eq!(files(knows_all, ("forms", "")), [["lab", "laser", "stereo", "systems"]]);
+        let cases: [(&str, &str, &[&[&str]]); 3] = [
+            ("", "use crate::lab::Lab;", &[]),
+            ("", "use crate::{laser, stereo};", &[&["forms", "laser", "stereo"]]),
+            ("use crate::SYSTEMS;", "", &[&["lab", "laser", "stereo", "systems"]]),
+        ];
+        for (lab, forms, circles) in cases {
+            let found =
+                circle(&[lib, main, systems, laser, stereo, ("lab", lab), ("forms", forms)]);
+            assert_eq!(found, circles, "{lab}{forms}");
+        }
     }
 
     #[test]

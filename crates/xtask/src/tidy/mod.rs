@@ -1,8 +1,9 @@
 //! Rules that the compiler does not check: allowed dependencies between crates, complete lists of
-//! plugins, documents without stale parts, plain words in comments.
+//! plugins, documents without stale parts, plain words in comments, few closures bound by `let`.
 
 mod arrows;
 mod circles;
+mod closures;
 mod commands;
 mod files;
 mod licences;
@@ -29,6 +30,7 @@ pub fn tidy(workspace: &Workspace) -> Result<()> {
     complaints.extend(names::check(workspace)?);
     complaints.extend(papers::check(workspace)?);
     complaints.extend(words::check(workspace)?);
+    complaints.extend(closures::check(workspace)?);
     complaints.extend(crate::faults::check(workspace)?);
     let documents = markdown::documents(workspace)?;
     complaints.extend(paths::check(workspace, &documents));

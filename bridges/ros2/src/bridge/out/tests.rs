@@ -66,21 +66,20 @@ fn shown_type(class: &str) -> &'static str {
 
 /// Adds the topics of a layout of Foxglove, with the kinds of their panels.
 fn add_topics(panel: &str, value: &serde_json::Value, topics: &mut BTreeSet<(String, String)>) {
-    let mut add = |name: &str| {
-        if name.starts_with('/') {
-            topics.insert((panel.to_owned(), name.to_owned()));
-        }
-    };
+    let mut names: Vec<&String> = Vec::new();
     match value {
         serde_json::Value::Object(fields) => {
-            fields.keys().for_each(|name| add(name));
+            names.extend(fields.keys());
             fields.values().for_each(|field| add_topics(panel, field, topics));
         }
         serde_json::Value::Array(items) => {
             items.iter().for_each(|item| add_topics(panel, item, topics));
         }
-        serde_json::Value::String(text) => add(text),
+        serde_json::Value::String(text) => names.push(text),
         _ => {}
+    }
+    for name in names.into_iter().filter(|name| name.starts_with('/')) {
+        topics.insert((panel.to_owned(), name.clone()));
     }
 }
 

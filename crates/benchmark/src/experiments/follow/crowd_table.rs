@@ -28,27 +28,28 @@ pub fn row(label: &str, rides: &[&Followed]) -> Option<Row> {
         return None;
     }
     let count = all.len() as u64;
-    let share = |is_so: fn(&CrowdMeasures) -> bool| {
-        Cell::share(all.iter().filter(|ride| is_so(ride)).count() as u64, count, 1)
-    };
-    let mean = |value: fn(&CrowdMeasures) -> f64, digits| {
-        Cell::mean(&all.iter().map(value).collect::<Vec<_>>(), digits)
-    };
+    let reached = all.iter().filter(|ride| ride.success).count() as u64;
+    let found = all.iter().filter(|ride| ride.search_success).count() as u64;
     let cells = vec![
         Cell::number(count as f64, 0),
-        share(|ride| ride.success),
-        share(|ride| ride.search_success),
-        mean(|ride| ride.path_m, 1),
-        mean(|ride| ride.search_m, 1),
-        mean(|ride| ride.speed_mps, 2),
-        mean(|ride| ride.acceleration_mps2, 2),
-        mean(|ride| ride.jerk_mps3, 1),
-        mean(|ride| ride.personal_s, 1),
-        mean(|ride| ride.private_s, 1),
-        mean(|ride| ride.out_of_sight_s, 1),
-        mean(|ride| ride.time_s, 1),
+        Cell::share(reached, count, 1),
+        Cell::share(found, count, 1),
+        mean_cell(&all, |ride| ride.path_m, 1),
+        mean_cell(&all, |ride| ride.search_m, 1),
+        mean_cell(&all, |ride| ride.speed_mps, 2),
+        mean_cell(&all, |ride| ride.acceleration_mps2, 2),
+        mean_cell(&all, |ride| ride.jerk_mps3, 1),
+        mean_cell(&all, |ride| ride.personal_s, 1),
+        mean_cell(&all, |ride| ride.private_s, 1),
+        mean_cell(&all, |ride| ride.out_of_sight_s, 1),
+        mean_cell(&all, |ride| ride.time_s, 1),
     ];
     Some(Row::ours(label, cells))
+}
+
+/// The mean of one measure over all rides.
+fn mean_cell(rides: &[CrowdMeasures], measure: fn(&CrowdMeasures) -> f64, digits: usize) -> Cell {
+    Cell::mean(&rides.iter().map(measure).collect::<Vec<_>>(), digits)
 }
 
 /// Returns the table of these rows; `None` without any.

@@ -429,25 +429,23 @@ fn report(args: &FollowArgs, seeds: Seeds, results: &[Followed]) -> Result<(), F
     let looks = args.fit.then(|| fit::looks(results));
     let findings = Findings { seeds, tables: &tables, looks: looks.as_ref(), rides: results };
     let json = to_json("the scores of the rides", &findings)?;
-    let joined = |show: fn(&Table) -> String| -> String {
-        tables.iter().map(show).collect::<Vec<_>>().join("\n")
-    };
+    let markdown = tables.iter().map(Table::markdown).collect::<Vec<_>>().join("\n");
     // Written before it is printed: a pipe that closes must not cost the results.
     if let Some(folder) = &args.output {
-        let texts = [json.clone(), joined(Table::markdown), table::likeness_csv(results)];
+        let texts = [json.clone(), markdown.clone(), table::likeness_csv(results)];
         for (name, text) in RESULTS.iter().zip(texts) {
             write_file(&folder.join(name), text)?;
         }
     }
     match args.format {
         TableFormat::Json => print(&json)?,
-        TableFormat::Markdown => print(&joined(Table::markdown))?,
+        TableFormat::Markdown => print(&markdown)?,
         TableFormat::Text => {
             // The course of events is readable for a single ride only.
             if let [one] = results {
                 print(&(one.story.join("\n") + "\n\n"))?;
             }
-            print(&joined(Table::text))?;
+            print(&tables.iter().map(Table::text).collect::<Vec<_>>().join("\n"))?;
             print(&format!("\n{}\n", reasons::lines(results).join("\n")))?;
         }
     }

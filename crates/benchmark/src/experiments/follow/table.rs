@@ -1,4 +1,4 @@
-use tagalong_eval::{draws_interval, percentile};
+use tagalong_eval::{Interval, draws_interval, percentile};
 use tagalong_math::counted;
 use tagalong_pipeline::Likeness;
 use tagalong_report::{Cell, Row, Table};
@@ -59,19 +59,21 @@ pub fn tables(results: &[Followed], seeds: Seeds) -> Vec<Table> {
 
 /// Returns the rides of each scene, then all of each value of a sweep over scenes, then all.
 fn groups(results: &[Followed]) -> Vec<(String, Vec<&Followed>)> {
-    let of = |is_of: &dyn Fn(&Followed) -> bool| results.iter().filter(|r| is_of(r)).collect();
     let suites = unique(results.iter().map(|result| result.suite.as_str()));
     let values = unique(results.iter().filter_map(|result| result.swept.as_deref()));
-    let each = suites.iter().map(|suite| (suite.to_string(), of(&|r| r.suite == *suite)));
-    let mut groups: Vec<(String, Vec<&Followed>)> = each.collect();
+    let mut groups: Vec<(String, Vec<&Followed>)> = Vec::new();
+    for suite in &suites {
+        let rides = results.iter().filter(|ride| ride.suite == *suite).collect();
+        groups.push((suite.to_string(), rides));
+    }
     if suites.len() > values.len() {
         for value in &values {
-            let rides = of(&|r| r.swept.as_deref() == Some(value));
-            groups.push((format!("all scenes {value}"), rides));
+            let rides = results.iter().filter(|ride| ride.swept.as_deref() == Some(value));
+            groups.push((format!("all scenes {value}"), rides.collect()));
         }
     }
     if suites.len() > 1 {
-        groups.push(("all scenes".into(), of(&|_| true)));
+        groups.push(("all scenes".into(), results.iter().collect()));
     }
     groups
 }
@@ -129,18 +131,7 @@ fn standing(results: &[Followed]) -> Vec<String> {
 fn cells(results: &[&Followed], judge: &RideJudge) -> Vec<Cell> {
     let rides: Vec<&Ridden> = results.iter().map(|result| &result.ridden).collect();
     let count = rides.len() as u64;
-    let times = |a: fn(&Ridden) -> f64, b: fn(&Ridden) -> f64| {
-        // Rides without any of that time would be a division by zero.
-        let of: Vec<&Ridden> = rides.iter().copied().filter(|ride| b(ride) > 0.0).collect();
-        draws_interval(of.len(), |drawn| {
-            let sum = |f: fn(&Ridden) -> f64| drawn.iter().map(|&i| f(of[i])).sum::<f64>();
-            sum(a) / sum(b)
-        })
-    };
-    let part = |a, b, digits| {
-        Cell::estimate(times(a, b).map(|share| share.within(0.0, 1.0)), digits).percent()
-    };
-    let after = times(|r| found_after(r).sum(), |r| found_after(r).count() as f64);
+    let after = ratio_of_sums(&rides, |r| found_after(r).sum(), |r| found_after(r).count() as f64);
     let refound: Vec<[u64; 2]> = rides
         .iter()
         // Resampling whole rides respects that the seconds of one ride are not independent.
@@ -149,10 +140,6 @@ fn cells(results: &[&Followed], judge: &RideJudge) -> Vec<Cell> {
             all.fold([0, 0], |[good, of], one| [good + u64::from(one), of + 1])
         })
         .collect();
-    let least = |of: fn(&Ridden) -> Option<f64>| {
-        let least = rides.iter().filter_map(|ride| of(ride)).min_by(f64::total_cmp);
-        least.map_or_else(Cell::default, |least| Cell::number(least, 2))
-    };
     let touches = rides.iter().filter(|ride| {
         [ride.clearance_people_m, ride.clearance_things_m].into_iter().flatten().any(|m| m < 0.0)
     });
@@ -162,20 +149,52 @@ fn cells(results: &[&Followed], judge: &RideJudge) -> Vec<Cell> {
     let kept = rides.iter().filter(|ride| ride.kept).count() as u64;
     vec![
         Cell::number(count as f64, 0),
-        part(|r| r.in_view_s, |r| r.time_s, 3),
+        share_cell(&rides, |r| r.in_view_s, |r| r.time_s, 3),
         Cell::clustered(&refound, 1),
         Cell::estimate(after.map(|time| time.within(0.0, f64::INFINITY)), 1),
-        part(|r| r.distance_kept_s, |r| r.slow_s, 3),
+        share_cell(&rides, |r| r.distance_kept_s, |r| r.slow_s, 3),
         Cell::mean(&farther, 2),
         Cell::share(kept, count, 1),
-        part(|r| r.wrong_s, |r| r.right_s + r.wrong_s, 4),
+        share_cell(&rides, |r| r.wrong_s, |r| r.right_s + r.wrong_s, 4),
         Cell::number(rides.iter().map(|ride| ride.longest_wrong_s).fold(0.0, f64::max), 1),
         Cell::number(touches.count() as f64, 0),
-        least(|ride| ride.clearance_people_m),
-        least(|ride| ride.clearance_things_m),
+        least_cell(&rides, |ride| ride.clearance_people_m),
+        least_cell(&rides, |ride| ride.clearance_things_m),
         Cell::mean(&jerks, 1),
         percentile(&took, 0.95).map_or_else(Cell::default, |ms| Cell::number(ms, 1)),
     ]
+}
+
+/// The sum of one measure over that of another, of the rides that have any of the other.
+fn ratio_of_sums(
+    rides: &[&Ridden],
+    part: fn(&Ridden) -> f64,
+    whole: fn(&Ridden) -> f64,
+) -> Option<Interval> {
+    // Rides without any of that time would be a division by zero.
+    let of: Vec<&Ridden> = rides.iter().copied().filter(|ride| whole(ride) > 0.0).collect();
+    draws_interval(of.len(), |drawn| {
+        let part_sum = drawn.iter().map(|&i| part(of[i])).sum::<f64>();
+        let whole_sum = drawn.iter().map(|&i| whole(of[i])).sum::<f64>();
+        part_sum / whole_sum
+    })
+}
+
+/// The part that one measure is of another, in per cent.
+fn share_cell(
+    rides: &[&Ridden],
+    part: fn(&Ridden) -> f64,
+    whole: fn(&Ridden) -> f64,
+    digits: usize,
+) -> Cell {
+    let share = ratio_of_sums(rides, part, whole).map(|share| share.within(0.0, 1.0));
+    Cell::estimate(share, digits).percent()
+}
+
+/// The least value of a measure, where a ride has one.
+fn least_cell(rides: &[&Ridden], measure: fn(&Ridden) -> Option<f64>) -> Cell {
+    let least = rides.iter().filter_map(|ride| measure(ride)).min_by(f64::total_cmp);
+    least.map_or_else(Cell::default, |least| Cell::number(least, 2))
 }
 
 /// Returns the times from coming back into view to being followed, s.
@@ -188,13 +207,13 @@ fn found_after(ride: &Ridden) -> impl Iterator<Item = f64> {
 fn reliabilities(results: &[Followed], pipeline: &str, seeds: Seeds) -> Vec<Table> {
     let of: Vec<&Ridden> =
         results.iter().filter(|r| r.pipeline == pipeline).map(|r| &r.ridden).collect();
-    let all = || of.iter().flat_map(|ride| &ride.likeness).map(|(like, _)| like);
-    if all().next().is_none() {
+    let mut all = of.iter().flat_map(|ride| &ride.likeness).map(|(like, _)| like).peekable();
+    if all.peek().is_none() {
         return Vec::new();
     }
     let title = format!("How far the lock of {pipeline} can be believed");
     let mut tables = vec![reliability(title.clone(), &of, |like| like.probability, seeds)];
-    if all().any(|like| (like.probability - uncalibrated(like)).abs() > 1e-9) {
+    if all.any(|like| (like.probability - uncalibrated(like)).abs() > 1e-9) {
         tables.push(reliability(
             format!("{title}: before the calibration"),
             &of,
@@ -338,16 +357,17 @@ mod tests {
 
     #[test]
     fn a_robot_that_never_moves_is_named_below_the_table() {
-        let stands = |never_moved| Followed {
-            pipeline: "blind".into(),
-            ridden: Ridden { never_moved, ..Ridden::default() },
-            ..Followed::default()
-        };
+        let moved = Followed { pipeline: "blind".into(), ..Followed::default() };
+        let mut stood = moved.clone();
+        stood.ridden.never_moved = Some("silent");
         let seeds = Split::Test.seeds(0, 2).unwrap();
-        let told = |results: &[Followed]| tables(results, seeds)[0].notes.last().unwrap().clone();
-        let both = told(&[stands(Some("silent")), stands(None)]);
-        assert_eq!(both, "blind never moved in 1 of 2 rides; reason of its commands: silent");
-        assert!(!told(&[stands(None)]).contains("never moved"));
+        let both = tables(&[stood, moved.clone()], seeds);
+        assert_eq!(
+            both[0].notes.last().expect("a note"),
+            "blind never moved in 1 of 2 rides; reason of its commands: silent"
+        );
+        let one = tables(&[moved], seeds);
+        assert!(!one[0].notes.last().expect("a note").contains("never moved"));
     }
 
     /// One sighting of the person with this probability by the log-odds, calibrated or not.

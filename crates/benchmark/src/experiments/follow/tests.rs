@@ -44,20 +44,22 @@ fn a_pipeline_that_is_told_follows_a_person_behind_the_robot_but_not_behind_a_wa
 
 #[test]
 fn each_pipeline_is_told_beside_seeing() {
+    let seeing = ("follow-depth".to_owned(), false);
+    let told = ("follow-depth-told".to_owned(), true);
+    assert_eq!(jobs_with(&[]), [seeing.clone(), seeing.clone()]);
+    assert_eq!(jobs_with(&["--told"]), [seeing.clone(), seeing, told.clone(), told]);
+}
+
+/// The name of each job's pipeline, and whether it is told, with these further arguments.
+fn jobs_with(more: &[&str]) -> Vec<(String, bool)> {
     let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/follow-depth.toml");
     let mut registry = Registry::default();
     tagalong_catalog::register(&mut registry);
-    let jobs_of = |more: &[&str]| {
-        let line = ["follow", config.to_str().unwrap(), "among-circular", "--seeds", "2"];
-        let args = Cli::parse_from(line.iter().chain(more)).follow;
-        let seeds = args.split.seeds(0, args.seeds).unwrap();
-        let jobs = jobs(&args, seeds, &registry).unwrap();
-        jobs.into_iter().map(|job| (job.contender.name, job.is_told)).collect::<Vec<_>>()
-    };
-    let seeing = ("follow-depth".to_owned(), false);
-    let told = ("follow-depth-told".to_owned(), true);
-    assert_eq!(jobs_of(&[]), [seeing.clone(), seeing.clone()]);
-    assert_eq!(jobs_of(&["--told"]), [seeing.clone(), seeing, told.clone(), told]);
+    let line = ["follow", config.to_str().expect("UTF-8"), "among-circular", "--seeds", "2"];
+    let args = Cli::parse_from(line.iter().chain(more)).follow;
+    let seeds = args.split.seeds(0, args.seeds).expect("enough seeds");
+    let jobs = jobs(&args, seeds, &registry).expect("valid arguments");
+    jobs.into_iter().map(|job| (job.contender.name, job.is_told)).collect()
 }
 
 #[test]
@@ -68,13 +70,15 @@ fn a_source_of_obstacles_that_the_scene_lacks_is_named_before_the_ride() {
         [filter]\nplugin = \"ekf\"\n[controller]\nplugin = \"clear-follow\"\n\
         [[collision_monitor.sources]]\nname = \"hazards\"\ntype = \"bumper\"\n";
     let contender = Contender::new("robot", config);
-    let ride = |block: &str| Ride::new(&scene(block), &contender, &registry, &mut ());
-    let refused = ride("bumpers = [{ name = \"other\" }]").unwrap_err().to_string();
+    let [other, none, same] =
+        ["bumpers = [{ name = \"other\" }]", "", "bumpers = [{ name = \"hazards\" }]"]
+            .map(|block| Ride::new(&scene(block), &contender, &registry, &mut ()));
+    let refused = other.unwrap_err().to_string();
     assert!(refused.contains("lacks the source `hazards`"), "{refused}");
     assert!(refused.contains("add `[[bumpers]]` with `name = \"hazards\"`"), "{refused}");
-    let refused = ride("").unwrap_err().to_string();
+    let refused = none.unwrap_err().to_string();
     assert!(refused.contains("--set 'bumpers=[{name=\"hazards\"}]'"), "{refused}");
-    assert!(ride("bumpers = [{ name = \"hazards\" }]").is_ok());
+    assert!(same.is_ok());
 }
 
 /// Returns the refusal of an argument line, whose paths are those of a clone.

@@ -87,11 +87,10 @@ pub fn trials(args: &TrialsArgs, registry: &Registry) -> Outcome {
     let forecast = Forecast::new(trials, "trials");
     let names = suites.iter().map(|(name, _)| name);
     let mut table = table::Table::new(seeds, names, contenders.iter().map(|c| &c.name));
-    let tell = |text: String| match args.format {
-        TableFormat::Text => bar.suspend(|| print(&text)),
-        TableFormat::Markdown | TableFormat::Json => Ok(()),
-    };
-    tell(table.header())?;
+    let is_text = args.format == TableFormat::Text;
+    if is_text {
+        bar.suspend(|| print(&table.header()))?;
+    }
     for (name, scenes) in &suites {
         bar.set_message(name.clone());
         let jobs = threads(args.jobs);
@@ -101,12 +100,13 @@ pub fn trials(args: &TrialsArgs, registry: &Registry) -> Outcome {
         });
         let results = results.map_err(Failure::failed)?;
         table.add(name, &contenders, &results);
-        tell(table.last_rows())?;
+        if is_text {
+            bar.suspend(|| print(&table.last_rows()))?;
+        }
     }
     bar.finish_and_clear();
-    tell(table.summary())?;
     match args.format {
-        TableFormat::Text => {}
+        TableFormat::Text => print(&table.summary())?,
         TableFormat::Markdown => print(&format!("{}\n", table.page().markdown()))?,
         TableFormat::Json => print(&to_json("the table", &table)?)?,
     }

@@ -80,17 +80,14 @@ impl Table {
 
     /// Adds a suite: for each random variant one result per contender.
     pub fn add(&mut self, suite: &str, contenders: &[Contender], results: &[Vec<Result>]) {
-        let column = |at: usize| results.iter().map(|draw| &draw[at]).collect::<Vec<_>>();
         for (at, contender) in contenders.iter().enumerate() {
-            self.rows.push(row(suite, &contender.name, &column(at)));
+            let column: Vec<&Result> = results.iter().map(|draw| &draw[at]).collect();
+            self.rows.push(row(suite, &contender.name, &column));
         }
         let Some((baseline, others)) = contenders.split_last() else { return };
-        let idf1 = |at: usize| -> Vec<f64> {
-            column(at).iter().map(|result| result.identity.idf1()).collect()
-        };
-        let base = idf1(others.len());
+        let base = idf1_of(results, others.len());
         for (at, contender) in others.iter().enumerate() {
-            self.gains.extend(paired_gain(&base, &idf1(at)).map(|gain| GainRow {
+            self.gains.extend(paired_gain(&base, &idf1_of(results, at)).map(|gain| GainRow {
                 suite: suite.to_owned(),
                 pipeline: contender.name.clone(),
                 baseline: baseline.name.clone(),
@@ -214,6 +211,11 @@ impl Table {
             format!("perfect, so the suite is too easy: {}", all.join(", "))
         }
     }
+}
+
+/// IDF1 of one contender, draw by draw.
+fn idf1_of(results: &[Vec<Result>], contender: usize) -> Vec<f64> {
+    results.iter().map(|draw| draw[contender].identity.idf1()).collect()
 }
 
 fn row(suite: &str, pipeline: &str, results: &[&Result]) -> Row {

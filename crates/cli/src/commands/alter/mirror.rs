@@ -54,14 +54,17 @@ pub(super) fn pose(of: &Isometry2<f64>) -> Isometry2<f64> {
 
 /// Returns a row of truth in images of this width, mirrored.
 pub(super) fn row(of: &Row, width: usize) -> Row {
-    let across =
-        |region: &Region| Region { x: width as f64 - 1.0 - region.x - region.width, ..*region };
     Row {
-        upper_body: of.upper_body.as_ref().map(across),
-        visible_body: of.visible_body.as_ref().map(across),
+        upper_body: of.upper_body.map(|region| mirrored_box(region, width)),
+        visible_body: of.visible_body.map(|region| mirrored_box(region, width)),
         head_in_camera_m: of.head_in_camera_m.map(|[right, down, ahead]| [-right, down, ahead]),
         ..of.clone()
     }
+}
+
+/// Returns a box at the other side of an image.
+fn mirrored_box(region: Region, width: usize) -> Region {
+    Region { x: width as f64 - 1.0 - region.x - region.width, ..region }
 }
 
 #[cfg(test)]

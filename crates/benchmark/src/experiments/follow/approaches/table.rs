@@ -250,18 +250,29 @@ mod tests {
         all.push(outlived(90.0, Some(contact(Touched::Approacher, true))));
         all.push(outlived(91.0, Some(contact(Touched::Thing, true))));
         let table = &tables(&all, Split::Test.seeds(0, 20).unwrap())[0];
-        let cell = |row: &str, column: &str| {
-            let row = table.rows.iter().find(|one| one.name == row).unwrap();
-            row.cells[COLUMNS.iter().position(|name| *name == column).unwrap()].value
-        };
-        assert_eq!((cell("all", "contacts"), cell("all", "%")), (Some(2.0), Some(10.0)));
-        assert!((cell("all", "<= %").unwrap() - 28.26).abs() < 0.01, "{:?}", cell("all", "<= %"));
-        assert_eq!(cell("all", "by approacher"), Some(1.0));
-        assert_eq!((cell("all", "seen"), cell("all", "unseen")), (Some(1.0), Some(0.0)));
-        assert_eq!((cell("all", "least room m"), cell("all", "stops")), (Some(0.0), Some(90.0)));
-        assert_eq!(cell("all", "fastest m/s"), Some(0.4));
-        assert_eq!(cell("without laser, left", "contacts"), Some(2.0));
-        assert_eq!(cell("without laser, front", "contacts"), Some(0.0));
+        for (row, column, value) in [
+            ("all", "contacts", 2.0),
+            ("all", "%", 10.0),
+            ("all", "by approacher", 1.0),
+            ("all", "seen", 1.0),
+            ("all", "unseen", 0.0),
+            ("all", "least room m", 0.0),
+            ("all", "stops", 90.0),
+            ("all", "fastest m/s", 0.4),
+            ("without laser, left", "contacts", 2.0),
+            ("without laser, front", "contacts", 0.0),
+        ] {
+            assert_eq!(cell_value(table, row, column), value, "{row}: {column}");
+        }
+        let bound = cell_value(table, "all", "<= %");
+        assert!((bound - 28.26).abs() < 0.01, "{bound}");
         assert!(table.rows.iter().all(|row| row.name != "with laser"));
+    }
+
+    /// The number in a cell of the table.
+    fn cell_value(table: &Table, row: &str, column: &str) -> f64 {
+        let row = table.rows.iter().find(|one| one.name == row).expect("a row of this name");
+        let column = COLUMNS.iter().position(|name| *name == column).expect("a known column");
+        row.cells[column].value.expect("a number")
     }
 }

@@ -72,14 +72,13 @@ fn approaches_come_from_all_sides_at_all_speeds() {
     let jobs = jobs(&args, &contenders, &paths, seeds(&args).unwrap());
     let scenes: Vec<Scene> = jobs.iter().map(|job| read_scene(job, &args).unwrap()).collect();
     assert_eq!(scenes.len(), 500);
-    let count = |is: &dyn Fn(&Scene) -> bool| scenes.iter().filter(|scene| is(scene)).count();
     for eighth in 0..8 {
-        let there = count(&|s| (approach(s).bearing_deg / 45.0) as i32 == eighth);
+        let there = count_of(&scenes, |s| (approach(s).bearing_deg / 45.0) as i32 == eighth);
         assert!((40..90).contains(&there), "{eighth}: {there}");
     }
     for seventh in 0..7 {
         let low = 0.2 + 0.2 * f64::from(seventh);
-        let there = count(&|s| (low..low + 0.2).contains(&approach(s).speed_mps));
+        let there = count_of(&scenes, |s| (low..low + 0.2).contains(&approach(s).speed_mps));
         assert!((45..100).contains(&there), "{low} m/s: {there}");
     }
     for side in Side::ALL {
@@ -88,7 +87,8 @@ fn approaches_come_from_all_sides_at_all_speeds() {
         assert!(near.count() > 20, "{side}");
     }
     for by in [ApproachBy::Person, ApproachBy::Trolley] {
-        assert!(count(&|s| approach(s).by == by && approach(s).aims) > 90, "{by:?}");
+        let aimed = count_of(&scenes, |s| approach(s).by == by && approach(s).aims);
+        assert!(aimed > 90, "{by:?}: {aimed}");
     }
     for height_m in [0.3, 0.5, 0.8, 1.2] {
         for latency_s in [0.1, 0.4] {
@@ -97,7 +97,7 @@ fn approaches_come_from_all_sides_at_all_speeds() {
             assert!(late > 35, "{height_m} m, {latency_s} s: {late}");
         }
     }
-    assert_eq!(count(&|scene| scene.laser.is_some()), 250);
+    assert_eq!(count_of(&scenes, |scene| scene.laser.is_some()), 250);
     let faults: Vec<_> = scenes.iter().flat_map(Scene::scheduled_faults).collect();
     let kinds: BTreeSet<&str> = faults.iter().map(|fault| fault.kind.name()).collect();
     assert!(faults.len() == 500 && kinds.len() > 20, "{kinds:?}");
@@ -106,6 +106,11 @@ fn approaches_come_from_all_sides_at_all_speeds() {
             .iter()
             .all(|scene| { scene.scheduled_faults()[0].from_s <= approach(scene).arrives_s() })
     );
+}
+
+/// The number of scenes that have a property.
+fn count_of(scenes: &[Scene], has_it: impl Fn(&Scene) -> bool) -> usize {
+    scenes.iter().filter(|scene| has_it(scene)).count()
 }
 
 #[test]
