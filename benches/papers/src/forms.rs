@@ -50,8 +50,9 @@ pub(crate) struct Headline {
     pub(crate) column: &'static str,
     pub(crate) published: f64,
     pub(crate) digits: usize,
-    /// The largest value that it can have; the least is 0.
-    pub(crate) most: f64,
+    /// True for a share of the draws, of which each has 100 or 0; another figure is a mean that is
+    /// not below 0.
+    pub(crate) is_share: bool,
     pub(crate) of: fn(Trial) -> Result<Headlines, TrialError>,
 }
 
@@ -209,16 +210,30 @@ fn cells(at: usize, real: &[Vec<Form>], simulated: &[Vec<Form>], headline: &Head
     let draws: Vec<&Tally> = draws.iter().collect();
     let errors: Vec<Vec<f64>> = simulated.iter().map(|forms| forms[at].errors_m.clone()).collect();
     let errors = Cell { deviation: None, ..over_draws(&errors, 3) };
-    let figures: Vec<Vec<f64>> = simulated.iter().map(|forms| forms[at].headline.clone()).collect();
-    let figure = Cell { deviation: None, ..over_draws(&figures, headline.digits) };
+    let figures = simulated.iter().map(|forms| &forms[at].headline);
+    let figure = if headline.is_share {
+        share(figures, headline.digits)
+    } else {
+        let figures: Vec<Vec<f64>> = figures.cloned().collect();
+        let figure = Cell { deviation: None, ..over_draws(&figures, headline.digits) };
+        figure.within(0.0, f64::INFINITY)
+    };
     vec![
         idf1,
         hota,
         pooled(&draws, 3, |scores| scores.idf1).within(0.0, 1.0),
         pooled(&draws, 3, |scores| scores.mota).within(f64::NEG_INFINITY, 1.0),
         errors.within(0.0, f64::INFINITY),
-        figure.within(0.0, headline.most),
+        figure,
     ]
+}
+
+/// Returns the share of draws with 100, and its Wilson interval, as in the other tables of successes:
+/// a mean of draws that all succeed has none.
+fn share<'a>(draws: impl Iterator<Item = &'a Vec<f64>>, digits: usize) -> Cell {
+    let values: Vec<f64> = draws.flatten().copied().collect();
+    let successes = values.iter().filter(|value| **value > 0.0).count();
+    Cell::share(successes as u64, values.len() as u64, digits)
 }
 
 #[cfg(test)]
@@ -287,14 +302,27 @@ mod tests {
         let table = OF_P3.table(&[], &[draw]);
         let headlines: Vec<_> = table.rows.iter().map(|row| row.cells[5].value.unwrap()).collect();
         assert_eq!(headlines, [97.1, 0.0, 29.0, 88.0, 100.0]);
-        let draws = [0.0, 100.0, 100.0].map(|kept| self::draw([(1, 0, &[kept])]));
-        let cells = cells(0, &[], &draws, &OF_P3.headline);
-        assert_eq!(cells[5].interval, Some([0.0, 100.0]), "a share is no more than all");
         assert!(table.rows[2].name.starts_with("as printed, read otherwise: one window"));
         assert_eq!(
             OF_P4.with_otherwise((OF_P4.contenders)(&lab, &OF_P4.configs).unwrap()).unwrap().len(),
             3
         );
+    }
+
+    #[test]
+    fn a_share_of_the_draws_has_the_interval_of_wilson() {
+        fn headline(draws: &[&[f64]]) -> Cell {
+            let draws: Vec<Vec<Form>> =
+                draws.iter().map(|values| draw([(1, 0, *values)])).collect();
+            cells(0, &[], &draws, &OF_P3.headline)[5].clone()
+        }
+
+        let most = headline(&[&[100.0], &[100.0], &[0.0], &[100.0], &[], &[100.0]]);
+        assert_eq!(most, Cell::share(4, 5, 0), "a crossing that is no trial does not count");
+        let all = headline(&[&[100.0][..]; 8]);
+        let [lower, upper] = all.interval.expect("eight successes leave room for a failure");
+        assert!((lower - 67.56).abs() < 0.01 && upper == 100.0, "{all:?}");
+        assert_eq!(headline(&[&[0.0][..]; 8]).interval.map(|ends| ends[0]), Some(0.0));
     }
 
     #[test]

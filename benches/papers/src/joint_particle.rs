@@ -84,7 +84,7 @@ pub(crate) const OF_P3: Forms = Forms {
         column: "success across, %",
         published: 97.1,
         digits: 0,
-        most: 100.0,
+        is_share: true,
         of: successes,
     },
     otherwise: Some(Reading {

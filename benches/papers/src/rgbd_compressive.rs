@@ -72,7 +72,7 @@ pub(crate) const OF_P2: Forms = Forms {
         column: "frames/s",
         published: 23.8,
         digits: 0,
-        most: f64::INFINITY,
+        is_share: false,
         of: frames_a_second,
     },
     notes: &[

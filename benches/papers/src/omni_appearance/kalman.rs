@@ -216,20 +216,25 @@ fn with_empty(error: Cell) -> Vec<Cell> {
     cells
 }
 
+/// Returns the share of the images in which a step finds the person, with its interval over rooms.
+fn found(walks: &[Walk], step: usize) -> Cell {
+    let mut rooms = Vec::new();
+    for walk in walks {
+        let near = walk.of_steps[step].iter().filter(|error| **error < FOUND_M).count();
+        rooms.push([near as u64, walk.images as u64]);
+    }
+    Cell::clustered(&rooms, 1)
+}
+
 /// Builds the table from the printed method to the corrected one, step by step.
 fn steps(walks: &[Walk]) -> Table {
     let names = std::iter::once("as printed").chain(STEPS.map(|(name, ..)| name)).chain(BEYOND);
     let mut rows = Vec::new();
     let mut before: Option<Vec<Vec<f64>>> = None;
     for (at, name) in names.enumerate() {
-        let found = walks.iter().map(|walk| {
-            let near = walk.of_steps[at].iter().filter(|error| **error < FOUND_M).count();
-            vec![100.0 * near as f64 / walk.images.max(1) as f64]
-        });
-        let found: Vec<Vec<f64>> = found.collect();
         let draws: Vec<Vec<f64>> = walks.iter().map(|walk| walk.of_steps[at].clone()).collect();
         let cells = vec![
-            Cell { deviation: None, ..over_draws(&found, 1) }.within(0.0, 100.0),
+            found(walks, at),
             over_draws(&draws, 3).within(0.0, f64::INFINITY),
             before.map_or_else(Cell::default, |before| difference(&before, &draws, 3)),
         ];
@@ -265,6 +270,22 @@ mod tests {
     use tagalong_pipeline::flattened;
 
     use super::*;
+
+    #[test]
+    fn the_share_that_is_found_ends_where_shares_end() {
+        fn room(errors_m: &[f64], images: usize) -> Walk {
+            Walk { of_filters: Vec::new(), of_steps: vec![errors_m.to_vec()], images }
+        }
+
+        // Student's interval of the means of these rooms ends beyond 100 %.
+        let rooms = [room(&[0.1; 40], 40), room(&[0.2; 40], 40), room(&[0.1; 30], 40)];
+        let cell = found(&rooms, 0);
+        assert!((cell.value.expect("images") - 100.0 * 110.0 / 120.0).abs() < 1e-9, "{cell:?}");
+        let [lower, upper] = cell.interval.expect("three rooms");
+        assert!(lower > 0.0 && lower < 80.0 && upper > 95.0 && upper < 100.0, "{cell:?}");
+        let far = [room(&[0.1, 0.6], 4), room(&[0.4], 4)];
+        assert_eq!(found(&far, 0).value, Some(25.0), "far off or without an answer is not found");
+    }
 
     #[test]
     fn every_filter_and_every_step_is_a_config() {

@@ -56,7 +56,7 @@ pub(crate) const OF_P5: Forms = Forms {
         column: "error of all answers, m",
         published: 0.145,
         digits: 3,
-        most: f64::INFINITY,
+        is_share: false,
         of: kalman::answers_m,
     },
     otherwise: None,

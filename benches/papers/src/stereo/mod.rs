@@ -143,7 +143,7 @@ pub(crate) const OF_P1: Forms = Forms {
         column: "frame, ms",
         published: 70.0,
         digits: 0,
-        most: f64::INFINITY,
+        is_share: false,
         of: frame_ms,
     },
     otherwise: None,
@@ -163,7 +163,7 @@ pub(crate) const OF_P4: Forms = Forms {
         column: "walker, frame of the start, m",
         published: 0.125,
         digits: 3,
-        most: f64::INFINITY,
+        is_share: false,
         of: walk::walker_errors_m,
     },
     notes: &[
