@@ -78,7 +78,7 @@ pub use obstacles::{ObstacleData, ObstacleReading, ObstacleReadings, RangeReadin
 pub use person::{Estimate, Person};
 pub use person_filter::{PerPerson, PersonFilter};
 pub use points::PointCloud;
-pub use scan::{FurtherScans, LaserScan, RayReading, UnreadRay};
+pub use scan::{FurtherScans, LaserScan, RayReading, SweepMotion, UnreadRay};
 pub use sensors::{CameraImage, ExternalDetections, RightImage, Sensor, Sensors};
 pub use time::Stamp;
 pub use track::{Track, TrackId};

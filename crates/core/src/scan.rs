@@ -1,8 +1,8 @@
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry2, Isometry3, Point3};
 
-use crate::Stamp;
+use crate::{Stamp, spatial_pose};
 
 /// One sweep of a laser scanner, in the robot frame at the time of its frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -11,8 +11,12 @@ pub struct LaserScan {
     /// Time of the measurement, by the clock of the frames; `None` for a scan of its frame's own time.
     /// Frames that come more often than scans carry the same scan, with the same stamp, again.
     pub stamp: Option<Stamp>,
-    /// Pose of the scanner in the robot frame: x forward, y left, z up.
+    /// Pose of the scanner in the robot frame: x forward, y left, z up. That at ray 0, if the robot
+    /// moves while the scanner turns.
     pub robot_from_scanner: Isometry3<f64>,
+    /// Motion of the robot while the scanner turns; `None` for a scan that is taken at once. The points
+    /// are moved by it already.
+    pub motion: Option<SweepMotion>,
     /// Direction of ray 0 in the frame of the scanner, rad.
     pub first_rad: f64,
     /// Angle from one ray to the next, rad; positive from right to left.
@@ -23,6 +27,25 @@ pub struct LaserScan {
     pub rays: Arc<[u32]>,
     /// Rays without a reflection within the range of the scanner, in their order.
     pub unread: Arc<[UnreadRay]>,
+}
+
+/// Motion of a robot while a laser scanner turns: each ray is measured a little later than the one
+/// before it, and the robot drives and turns evenly meanwhile.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SweepMotion {
+    /// Pose of the robot at ray 0 in the robot frame of the scan.
+    pub first: Isometry2<f64>,
+    /// Pose of the robot at the last ray in the same frame.
+    pub last: Isometry2<f64>,
+    /// Number of the last ray.
+    pub last_ray: u32,
+}
+
+impl SweepMotion {
+    /// Returns the pose of the robot at the time of a ray.
+    pub fn robot_at(&self, ray: u32) -> Isometry2<f64> {
+        self.first.lerp_slerp(&self.last, f64::from(ray) / f64::from(self.last_ray.max(1)))
+    }
 }
 
 /// Scans of further laser scanners at the moment of a frame, each in a place of its own; `None` where
@@ -87,6 +110,7 @@ impl LaserScan {
         Self {
             stamp: None,
             robot_from_scanner: Isometry3::identity(),
+            motion: None,
             first_rad: 0.0,
             increment_rad: 0.0,
             points,
@@ -122,6 +146,7 @@ impl LaserScan {
         Self {
             stamp: None,
             robot_from_scanner,
+            motion: None,
             first_rad,
             increment_rad,
             points: points.into(),
@@ -156,9 +181,80 @@ impl LaserScan {
         Self { stamp: Some(stamp), ..self }
     }
 
+    /// Returns the scan with [`LaserScan::motion`] as given.
+    pub fn with_motion(self, motion: Option<SweepMotion>) -> Self {
+        Self { motion, ..self }
+    }
+
+    /// Returns the pose of the scanner in the robot frame at the time of a ray.
+    pub fn scanner_at(&self, ray: u32) -> Isometry3<f64> {
+        match &self.motion {
+            None => self.robot_from_scanner,
+            Some(motion) => {
+                let since_first = motion.robot_at(ray) * motion.first.inverse();
+                spatial_pose(&since_first) * self.robot_from_scanner
+            }
+        }
+    }
+
+    /// Returns the place at a distance, m, along a ray in the frame that the scanner has at that ray.
+    pub fn place_in_scanner(&self, ray: u32, range_m: f64) -> Point3<f64> {
+        let angle = self.first_rad + f64::from(ray) * self.increment_rad;
+        Point3::new(range_m * angle.cos(), range_m * angle.sin(), 0.0)
+    }
+
     /// Returns the place in the robot frame at a distance, m, along a ray.
     pub fn place(&self, ray: u32, range_m: f64) -> Point3<f64> {
-        let angle = self.first_rad + f64::from(ray) * self.increment_rad;
-        self.robot_from_scanner * Point3::new(range_m * angle.cos(), range_m * angle.sin(), 0.0)
+        self.scanner_at(ray) * self.place_in_scanner(ray, range_m)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+
+    /// A scan of four rays with this motion, of a scanner 0.2 m before the middle of the robot.
+    fn laser_scan(motion: Option<SweepMotion>) -> LaserScan {
+        let mount = Isometry3::new(Vector3::new(0.2, 0.0, 0.3), Vector3::zeros());
+        LaserScan::of_points(Vec::new())
+            .with_scanner(mount)
+            .with_rays(0.0, 0.5, Vec::new())
+            .with_motion(motion)
+    }
+
+    #[test]
+    fn places_along_a_ray_of_a_laser_move_with_the_robot() {
+        let motion = SweepMotion {
+            first: Isometry2::translation(1.0, 0.0),
+            last: Isometry2::translation(1.6, 0.0),
+            last_ray: 3,
+        };
+        let still = laser_scan(None);
+        let moving = laser_scan(Some(motion));
+        for (ray, driven_m) in [(0, 0.0), (1, 0.2), (3, 0.6)] {
+            let off = moving.place(ray, 2.0) - still.place(ray, 2.0);
+            assert!((off - Vector3::new(driven_m, 0.0, 0.0)).norm() < 1e-12, "ray {ray}: {off}");
+            let back = moving.scanner_at(ray).inverse() * moving.place(ray, 2.0);
+            assert!((back - moving.place_in_scanner(ray, 2.0)).norm() < 1e-12, "ray {ray}: {back}");
+        }
+    }
+
+    #[test]
+    fn the_scanner_of_a_laser_scan_turns_around_the_middle_of_the_robot() {
+        let quarter = std::f64::consts::FRAC_PI_2;
+        let motion = SweepMotion {
+            first: Isometry2::identity(),
+            last: Isometry2::rotation(quarter),
+            last_ray: 2,
+        };
+        let scan = laser_scan(Some(motion));
+        let end = scan.scanner_at(2).translation.vector;
+        assert!((end - Vector3::new(0.0, 0.2, 0.3)).norm() < 1e-12, "{end}");
+        assert_eq!(
+            scan.scanner_at(0),
+            spatial_pose(&Isometry2::identity()) * scan.robot_from_scanner
+        );
     }
 }

@@ -74,7 +74,7 @@ pub fn read_leg_scans(path: &Path, limits: &Limits) -> Result<Vec<LegScan>, LogE
 }
 
 fn core_scan(scan: &LaserScan) -> CoreScan {
-    seen_from(scan, &Isometry3::identity(), &Isometry2::identity())
+    seen_from(scan, &Isometry3::identity(), |_| Isometry2::identity())
 }
 
 fn places(poses: &PoseArray) -> Vec<Point2<f64>> {

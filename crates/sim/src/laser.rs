@@ -37,6 +37,10 @@ pub struct LaserSettings {
     /// Standard deviation of a range, m.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub sigma_m: f64,
+    /// Standard deviation that grows with the range, m per m, beside `sigma_m`: cheap scanners find the
+    /// range by the angle of a spot, and have 0.005, which is 2 cm at 4 m.
+    #[schemars(range(min = 0.0, max = 0.2))]
+    pub sigma_per_m: f64,
 }
 
 impl Default for LaserSettings {
@@ -48,6 +52,7 @@ impl Default for LaserSettings {
             min_range_m: 0.12,
             max_range_m: 8.0,
             sigma_m: 0.01,
+            sigma_per_m: 0.0,
         }
     }
 }
@@ -93,7 +98,7 @@ impl LaserSettings {
         for (ray, direction) in (0..).zip(self.directions()) {
             let ahead = Vector3::new(direction.cos(), direction.sin(), 0.0);
             let metres = world.distance(&slice, &(world_from_robot.rotation * ahead));
-            let measured = metres + self.sigma_m * normal_at(seed, ray);
+            let measured = metres + self.sigma_at(metres) * normal_at(seed, ray);
             ranges.push(if measured > self.max_range_m {
                 f32::INFINITY
             } else if measured < self.min_range_m {
@@ -103,6 +108,15 @@ impl LaserSettings {
             });
         }
         ranges
+    }
+
+    /// Returns the standard deviation of a range, m; beyond the farthest one it stays the same.
+    fn sigma_at(&self, metres: f64) -> f64 {
+        if self.sigma_per_m == 0.0 {
+            return self.sigma_m;
+        }
+        let growing_m = self.sigma_per_m * metres.min(self.max_range_m);
+        (self.sigma_m * self.sigma_m + growing_m * growing_m).sqrt()
     }
 
     /// Returns true if two rays or more meet an object within the range, with none of the others
@@ -151,6 +165,7 @@ mod tests {
         min_range_m: 0.3,
         max_range_m: 8.0,
         sigma_m: 0.0,
+        sigma_per_m: 0.0,
     };
 
     /// Balls of half a metre at these places.
@@ -191,16 +206,34 @@ mod tests {
         assert!((FOUR.step_rad().to_degrees() - 90.0).abs() < 1e-9);
     }
 
+    /// Returns the standard deviation of the ranges to a ball that begins at a distance, m, over 400
+    /// seeds.
+    fn deviation_m(laser: &LaserSettings, ahead_m: f64) -> f64 {
+        let world = world(&[[ahead_m + 0.5, 0.0]]);
+        let mut variance = 0.0;
+        for seed in 0..400 {
+            let ranges = laser.measure(&world, &Isometry3::identity(), seed);
+            variance += (f64::from(ranges[2]) - ahead_m).powi(2) / 400.0;
+        }
+        variance.sqrt()
+    }
+
     #[test]
     fn noise_has_the_deviation_that_is_asked_for() {
-        let world = world(&[[3.0, 0.0]]);
-        let noisy = LaserSettings { sigma_m: 0.05, ..FOUR };
-        let mut squares = 0.0;
-        for seed in 0..400 {
-            let ranges = noisy.measure(&world, &Isometry3::identity(), seed);
-            squares += (f64::from(ranges[2]) - 2.5).powi(2);
+        let deviation_m = deviation_m(&LaserSettings { sigma_m: 0.05, ..FOUR }, 2.5);
+        assert!((0.04..0.06).contains(&deviation_m), "{deviation_m}");
+    }
+
+    #[test]
+    fn the_noise_of_a_cheap_scanner_grows_with_the_range() {
+        let cheap = LaserSettings { sigma_m: 0.003, sigma_per_m: 0.005, ..FOUR };
+        for (ahead_m, expected_m) in [(0.5, 0.004), (4.0, 0.02), (7.5, 0.038)] {
+            let deviation_m = deviation_m(&cheap, ahead_m);
+            let off = deviation_m / expected_m - 1.0;
+            assert!(off.abs() < 0.15, "{deviation_m} m at {ahead_m} m");
         }
-        let variance: f64 = squares / 400.0;
-        assert!((0.04..0.06).contains(&variance.sqrt()), "{variance}");
+        // Where nothing is, nothing is measured, whatever the noise.
+        let ranges = cheap.measure(&world(&[]), &Isometry3::identity(), 1);
+        assert_eq!(ranges, [f32::INFINITY; 4]);
     }
 }

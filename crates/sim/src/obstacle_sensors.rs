@@ -239,6 +239,7 @@ impl ScannerSettings {
             min_range_m: self.min_range_m,
             max_range_m: self.max_range_m,
             sigma_m: self.sigma_m,
+            sigma_per_m: 0.0,
         }
     }
 

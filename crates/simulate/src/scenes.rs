@@ -14,6 +14,7 @@ const BUILT_IN: [(&str, &str); 63] = [
     ("behind-glass-sonar", include_str!("../configs/scenes/behind-glass-sonar.toml")),
     ("cafeteria", include_str!("../configs/scenes/cafeteria.toml")),
     ("cafeteria-high", include_str!("../configs/scenes/cafeteria-high.toml")),
+    ("cheap-laser", include_str!("../configs/scenes/cheap-laser.toml")),
     ("corridor", include_str!("../configs/scenes/corridor.toml")),
     ("corridor-high", include_str!("../configs/scenes/corridor-high.toml")),
     ("crossing", include_str!("../configs/scenes/crossing.toml")),

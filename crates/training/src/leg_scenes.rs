@@ -131,6 +131,7 @@ fn scanner(chance: &mut SplitMix64) -> LaserSettings {
         min_range_m: 0.05,
         max_range_m: chance.between(6.0, 15.0),
         sigma_m: chance.between(0.003, 0.03),
+        sigma_per_m: 0.0,
     }
 }
 

@@ -59,6 +59,7 @@ impl Coverage {
                 // Dirt on the scanner, or a hand on it: what is behind is not seen.
                 RayReading::TooNear(_) | RayReading::Invalid => Look::Unknown,
             };
+            let eye: Point2<f64> = scan.scanner_at(unread.ray).translation.vector.xy().into();
             looks.push((direction(&eye, &scan.place(unread.ray, 1.0).xy()), look));
         }
         Self { eye, looks, min_share }

@@ -240,9 +240,7 @@ impl ScanReference {
 impl Watch<ScanReference> {
     /// Takes in a new scan.
     pub(super) fn add_scan(&mut self, scan: &LaserScan, tracks: &[Track]) {
-        let origin = scan.robot_from_scanner.translation.vector;
-        let ranges: Vec<f32> =
-            scan.points.iter().map(|point| (point.coords - origin).norm() as f32).collect();
+        let ranges = measured_ranges(scan);
         // Moving a scan to the time of its frame rounds the ranges: to a fiftieth of a millimetre they
         // are the same.
         self.compare_bits(
@@ -278,6 +276,17 @@ impl Watch<ScanReference> {
     }
 }
 
+/// Returns the ranges of the points of a scan as the scanner measured them, m, whatever the robot did
+/// while it turned.
+fn measured_ranges(scan: &LaserScan) -> Vec<f32> {
+    let mut ranges = Vec::with_capacity(scan.points.len());
+    for (ray, point) in scan.rays.iter().zip(scan.points.iter()) {
+        let eye = scan.scanner_at(*ray).translation.vector;
+        ranges.push((point.coords - eye).norm() as f32);
+    }
+    ranges
+}
+
 fn contradicts_scan(
     scan: &LaserScan,
     then: &ScanReference,
@@ -292,7 +301,7 @@ fn contradicts_scan(
         if then.left_out[ray] || !(0.0 < range && range < FAR_M) {
             continue;
         }
-        let met = scanner_from_robot * scan.place(ray as u32, range);
+        let met = scan.place_in_scanner(ray as u32, range);
         let point: Point3<f64> = now_from_then * (then.robot_from_scanner * met);
         let seen = scanner_from_robot * point;
         let turns = std::f64::consts::TAU / scan.increment_rad.abs();
@@ -337,5 +346,46 @@ impl Counts {
     fn contradicts(&self) -> Option<bool> {
         (self.telling >= ENOUGH)
             .then(|| f64::from(self.unchanged) >= UNCHANGED * f64::from(self.telling))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tagalong_core::SweepMotion;
+
+    use super::*;
+
+    const RANGES: [f64; 4] = [1.0, 2.5, 0.7, 4.0];
+
+    /// A scan of the same ranges by a scanner that turns while the robot drives and turns.
+    fn laser_scan(driven_m: f64, turned_rad: f64) -> LaserScan {
+        let motion = SweepMotion {
+            first: Isometry2::identity(),
+            last: Isometry2::new(nalgebra::Vector2::new(driven_m, 0.0), turned_rad),
+            last_ray: 3,
+        };
+        let empty = LaserScan::of_points(Vec::new())
+            .with_scanner(Isometry3::translation(0.3, 0.1, 0.2))
+            .with_rays(-1.0, 0.5, Vec::new())
+            .with_motion(Some(motion));
+        let mut points = Vec::new();
+        for (ray, range_m) in (0..).zip(RANGES) {
+            points.push(empty.place(ray, range_m));
+        }
+        LaserScan::of_points(points)
+            .with_scanner(empty.robot_from_scanner)
+            .with_rays(empty.first_rad, empty.increment_rad, vec![0, 1, 2, 3])
+            .with_motion(Some(motion))
+    }
+
+    /// A frozen scanner repeats its ranges, not the points to which the odometry moves them.
+    #[test]
+    fn frozen_ranges_of_a_laser_are_the_same_however_the_robot_moves() {
+        for (driven_m, turned_rad) in [(0.0, 0.0), (0.1, 0.0), (0.05, 0.2)] {
+            let ranges = measured_ranges(&laser_scan(driven_m, turned_rad));
+            for (measured_m, range_m) in ranges.iter().zip(RANGES) {
+                assert!((f64::from(*measured_m) - range_m).abs() < 1e-6, "{ranges:?}");
+            }
+        }
     }
 }

@@ -150,7 +150,7 @@ impl ObstacleReader {
             Messages::Scan(scans) => {
                 let Timed { stamp, value, .. } = scans.newest_until(latest)?;
                 let mount = mount_at(source, moment, &value.header.frame_id, *stamp, tally)?;
-                let scan = seen_from(value, &mount, &moment.robot_from(*stamp));
+                let scan = seen_from(value, &mount, |then| moment.robot_from(then));
                 (*stamp, ObstacleData::Scan(scan))
             }
             Messages::Depth(depth) => {

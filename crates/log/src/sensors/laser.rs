@@ -4,11 +4,12 @@ use std::ops::RangeInclusive;
 
 use nalgebra::{Isometry2, Isometry3, Point3};
 use tagalong_core::{
-    FurtherScans, Input, LaserScan as Scan, RayReading, Sensors, UnreadRay, spatial_pose,
+    FurtherScans, Input, LaserScan as Scan, RayReading, Sensors, Stamp, UnreadRay, spatial_pose,
 };
 
 use super::recent::Recent;
 pub(crate) use super::scan_faults::scan_fault;
+use super::sweep::{note_impossible_times, sweep_motion};
 use super::{Moment, SensorReader, SensorType};
 use crate::msgs::{CdrError, LaserScan, decode};
 use crate::tally::Tally;
@@ -92,27 +93,33 @@ impl Scans {
             ));
             return None;
         };
-        Some(seen_from(scan, &mount, &moment.robot_from(then)))
+        note_impossible_times(scan, moment.topic, tally);
+        Some(seen_from(scan, &mount, |then| moment.robot_from(then)))
     }
 }
 
-/// Returns a scan in the frame of a robot that has moved by `robot_from_then` since.
+/// Returns a scan in the frame of a robot whose poses at other times `robot_from` gives. Each point
+/// moves with the robot since the time of its own ray.
 pub(crate) fn seen_from(
     scan: &LaserScan,
     robot_from_laser: &Isometry3<f64>,
-    robot_from_then: &Isometry2<f64>,
+    robot_from: impl Fn(Stamp) -> Isometry2<f64>,
 ) -> Scan {
+    let first = robot_from(scan.header.stamp());
+    let motion = sweep_motion(scan, first, robot_from);
     let (rays, points): (Vec<u32>, Vec<Point3<f64>>) = points(scan)
         .map(|(ray, point)| {
             let then = robot_from_laser * point;
             // The robot moves on a floor: heights stay.
-            let now = robot_from_then * then.xy();
+            let robot = motion.map_or(first, |motion| motion.robot_at(ray));
+            let now = robot * then.xy();
             (ray, Point3::new(now.x, now.y, then.z))
         })
         .unzip();
     Scan::of_points(points)
         .with_stamp(scan.header.stamp())
-        .with_scanner(spatial_pose(robot_from_then) * robot_from_laser)
+        .with_scanner(spatial_pose(&first) * robot_from_laser)
+        .with_motion(motion)
         .with_rays(f64::from(scan.angle_min), f64::from(scan.angle_increment), rays)
         .with_unread(unread(scan).collect::<Vec<_>>())
 }
@@ -154,7 +161,6 @@ fn unread(scan: &LaserScan) -> impl Iterator<Item = UnreadRay> {
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector3;
-    use tagalong_core::Stamp;
 
     use super::*;
     use crate::msgs::Header;
@@ -188,8 +194,7 @@ mod tests {
     fn points_move_with_the_robot() {
         let scan = scan(1.0, &[f32::NAN, 2.0]);
         let mount = Isometry3::new(Vector3::new(0.1, 0.0, 0.2), Vector3::zeros());
-        let driven = Isometry2::translation(-0.5, 0.0);
-        let scan = seen_from(&scan, &mount, &driven);
+        let scan = seen_from(&scan, &mount, |_| Isometry2::translation(-0.5, 0.0));
         assert!((scan.points[0] - Point3::new(1.6, 0.0, 0.2)).norm() < 1e-6, "{scan:?}");
         let origin = scan.robot_from_scanner.translation.vector;
         assert!((origin - Vector3::new(-0.4, 0.0, 0.2)).norm() < 1e-12, "{origin}");

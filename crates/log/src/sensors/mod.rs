@@ -22,6 +22,7 @@ pub(crate) mod laser;
 pub(crate) mod points;
 pub(crate) mod recent;
 mod scan_faults;
+pub(crate) mod sweep;
 
 use std::sync::Arc;
 

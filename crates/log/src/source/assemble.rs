@@ -29,6 +29,7 @@ use crate::scan::Type;
 use crate::sensors::Moment;
 use crate::sensors::laser::{lose_scan, scan_fault, seen_from};
 use crate::sensors::points::cloud_in_robot;
+use crate::sensors::sweep::note_impossible_times;
 use crate::tally::Tally;
 use crate::topics::Problem;
 
@@ -154,7 +155,9 @@ impl Assembler {
             count_without_pose(plan, "laser_scans_without_pose", tally);
             return None;
         };
-        let seen = seen_from(&sweep, &pose, &Isometry2::identity());
+        note_impossible_times(&sweep, plan.primary(), tally);
+        let seen =
+            seen_from(&sweep, &pose, |then| self.robot_between(plan, scan.stamp, then, intake));
         let sensors = Sensors::default().with(seen);
         let camera = self.blind_camera(pose);
         Some(self.finish(plan, scan.stamp, camera, sensors, intake, tally))
@@ -392,6 +395,20 @@ impl Assembler {
         // Without odometry the robot stays at its last pose, which is marked as stale.
         let last = self.previous.map_or_else(Isometry2::identity, |(_, last)| last.pose);
         found.unwrap_or(PoseAt { pose: last, stale: true })
+    }
+
+    /// Returns the pose of the robot at one time in the robot frame of another.
+    fn robot_between(
+        &self,
+        plan: &Plan,
+        now: Stamp,
+        then: Stamp,
+        intake: &Intake,
+    ) -> Isometry2<f64> {
+        if now == then {
+            return Isometry2::identity();
+        }
+        self.pose_at(plan, now, intake).pose.inverse() * self.pose_at(plan, then, intake).pose
     }
 
     /// Returns true if odometry jumps between the previous frame and this one.

@@ -9,6 +9,7 @@ mod common;
 mod lost_pairs;
 mod obstacles;
 mod odometry_age;
+mod scan_motion;
 mod topics;
 
 use common::{INFO, LogWriter, SavedLog, at, camera, info_of, level_pose, started};
