@@ -160,7 +160,7 @@ fn write(folder: &Path, all: &[ExperimentFindings]) -> Result<(), Failure> {
     let tables = all.iter().flat_map(|found| &found.findings.tables);
     let pages: Vec<String> = tables.map(Table::markdown).collect();
     write_file(&folder.join("tables.json"), &json(all)?)?;
-    write_file(&folder.join("tables.md"), &pages.join("\n"))?;
+    write_file(&folder.join("tables.md"), pages.join("\n"))?;
     for picture in all.iter().flat_map(|found| &found.findings.pictures) {
         write_file(&folder.join(format!("{}.svg", picture.name)), &picture.svg)?;
     }

@@ -232,6 +232,8 @@ fn distances(rooms: &[Room], shipped: &[Shipped; 2]) -> Result<Table, ReproduceE
 
 /// Builds the table for Fig. 5, of which the values are lost.
 fn correlations(rooms: &[Room]) -> Result<Table, ReproduceError> {
+    type Value = fn(&Head, &Sample) -> f64;
+
     // The deviation over rooms is not that of samples, which the other tables show.
     fn cell(draws: &[Vec<f64>]) -> Cell {
         Cell { deviation: None, ..over_draws(draws, 3) }.within(-1.0, 1.0)
@@ -242,7 +244,7 @@ fn correlations(rooms: &[Room]) -> Result<Table, ReproduceError> {
         let [training, test] = Split::Place.divide(room.of(Eye::Ours), 0);
         parts.extend(fitted(&training, 0)?.map(|head| (head, test)));
     }
-    let values: [(&str, fn(&Head, &Sample) -> f64); 4] = [
+    let values: [(&str, Value); 4] = [
         ("feature 1, width", |_, s| s.features.width),
         ("feature 2, lower edge", |_, s| s.features.bottom),
         ("feature 3, pixels", |_, s| s.features.pixels),

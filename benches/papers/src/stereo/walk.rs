@@ -45,6 +45,9 @@ const PACE_S: f64 = 1.0;
 /// Errors of some walks.
 type Walks<'a> = Vec<&'a [f64]>;
 
+/// Errors of a walk that a table shows.
+type ErrorsOf = fn(&Walk) -> &[f64];
+
 /// Settings of a robot that follows behind the walker, as the paper's does, and so keeps the walker
 /// in view.
 pub const FOLLOWED: [(&str, &str); 3] =
@@ -88,7 +91,7 @@ pub fn by_wheels(lab: &Lab) -> Result<Findings, ReproduceError> {
 }
 
 fn wheels_table(columns: &[Vec<Walk>]) -> Table {
-    let errors: [(&str, fn(&Walk) -> &[f64]); 5] = [
+    let errors: [(&str, ErrorsOf); 5] = [
         ("stereo-svm-ekf, frame of the start", |walk| &walk.errors[0].in_start),
         ("stereo-svm-ekf, frame of the robot", |walk| &walk.errors[0].in_robot),
         ("stereo-verified, frame of the start", |walk| &walk.errors[1].in_start),
@@ -230,15 +233,14 @@ fn table(walks: &[Walk], variants: &[Variant]) -> Table {
     for (at, Variant { name, .. }) in variants.iter().enumerate() {
         let lost = walks.iter().map(|w| [w.errors[at].without, w.errors[at].frames]);
         let without = Cell::clustered(&lost.collect::<Vec<_>>(), 1);
-        let frames: [(&str, fn(&Errors) -> &[f64]); 2] =
-            [("start", |errors| &errors.in_start), ("robot", |errors| &errors.in_robot)];
-        for (frame, of) in frames {
-            let errors: Walks<'_> = walks.iter().map(|walk| of(&walk.errors[at])).collect();
+        let in_start: Walks<'_> = walks.iter().map(|w| &w.errors[at].in_start[..]).collect();
+        let in_robot: Walks<'_> = walks.iter().map(|w| &w.errors[at].in_robot[..]).collect();
+        for (frame, errors) in [("start", in_start), ("robot", in_robot)] {
             let cells = cells(&errors).into_iter().chain([without.clone()]).collect();
             rows.push(Row::ours(format!("{name}, frame of the {frame}"), cells));
         }
     }
-    let bounds: [(&str, fn(&Walk) -> &[f64]); 2] = [
+    let bounds: [(&str, ErrorsOf); 2] = [
         ("the drift of the wheels, frame of the start", |walk| &walk.drift),
         ("exact while half shows, then the pace kept", |walk| &walk.pace),
     ];
