@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// Names of the scenes of `configs/scenes`, with their texts.
-const BUILT_IN: [(&str, &str); 63] = [
+const BUILT_IN: [(&str, &str); 64] = [
     ("among-circular", include_str!("../configs/scenes/among-circular.toml")),
     ("among-clutter", include_str!("../configs/scenes/among-clutter.toml")),
     ("among-corridor", include_str!("../configs/scenes/among-corridor.toml")),
