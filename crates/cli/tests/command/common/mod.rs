@@ -33,7 +33,10 @@ pub fn unread(command: &mut Command) -> Output {
 
 /// The program as it is shipped.
 pub fn tagalong() -> Command {
-    Command::new(env!("CARGO_BIN_EXE_tagalong"))
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tagalong"));
+    // The networks that somebody has installed on this machine choose other pipelines.
+    command.env("TAGALONG_HOME", concat!(env!("CARGO_TARGET_TMPDIR"), "/nothing-installed"));
+    command
 }
 
 /// The same program with the plugin of `examples/own_plugin.rs`.
