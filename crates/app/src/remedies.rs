@@ -252,13 +252,13 @@ impl Change {
 fn line(resolved: &Table, key: &str, value: &Value) -> String {
     let parts: Vec<&str> = key.split('.').collect();
     match parts[..] {
-        // A section of a list is known by its plugin.
+        // As in a config that extends this one.
         [section, at, "config", ref rest @ ..] if at.parse::<usize>().is_ok() => {
             let item = at.parse::<usize>().ok().and_then(|at| resolved.get(section)?.get(at));
             let plugin = item.and_then(|item| item.get("plugin")).and_then(Value::as_str);
             let plugin = plugin.unwrap_or_default();
             let rest = rest.join(".");
-            format!("[[{section}]] plugin = \"{plugin}\", config = {{ {rest} = {value} }}")
+            format!("{section}.{at}.config.{rest} = {value} # {plugin}")
         }
         [section] => match value.as_table() {
             Some(table) => {
@@ -294,10 +294,11 @@ impl Remedy {
         for (section, value) in resolved {
             match value {
                 Value::Array(items) => {
-                    let tables = items.iter().filter_map(Value::as_table);
-                    tables.for_each(|table| {
-                        self.section(&format!("[[{section}]]"), table, &mut found)
-                    });
+                    let tables = items.iter().enumerate();
+                    for (at, table) in tables.filter_map(|(at, item)| Some((at, item.as_table()?)))
+                    {
+                        self.section(&format!("{section}.{at}"), table, &mut found);
+                    }
                 }
                 Value::Table(table) => self.section(&format!("[{section}]"), table, &mut found),
                 _ => {}
@@ -348,12 +349,20 @@ impl Setting {
         lines.map(Self::line).collect::<Vec<_>>().join(" and ")
     }
 
-    /// Returns the line of settings of one section and plugin.
+    /// Returns the line of settings of one section and plugin; those of an entry of a list as a config
+    /// that extends this one changes them.
     fn line(settings: &[Self]) -> String {
         let Some(first) = settings.first() else { return String::new() };
         let values: Vec<&str> = settings.iter().map(|one| one.assignment.as_str()).collect();
         let section = &first.section;
         match &first.plugin {
+            Some(plugin) if !section.starts_with('[') => {
+                let values = match values[..] {
+                    [value] => format!(".{value}"),
+                    _ => format!(" = {{ {} }}", values.join(", ")),
+                };
+                format!("{section}.config{values} ({plugin})")
+            }
             Some(plugin) => {
                 format!("{section} plugin = \"{plugin}\", config = {{ {} }}", values.join(", "))
             }
@@ -428,7 +437,7 @@ mod tests {
         let resolved: Table =
             toml::from_str("[[detectors]]\nplugin = 'own'\nconfig = { hue = 3 }\n").unwrap();
         let lines = remedies.of("too blue").unwrap().lines(&resolved);
-        assert_eq!(lines, ["[[detectors]] plugin = \"own\", config = { hue = 3 }"]);
+        assert_eq!(lines, ["detectors.0.config.hue = 3 (own)"]);
         assert!(Remedies::default().of("too blue").is_none());
     }
 
@@ -448,8 +457,8 @@ mod tests {
         let resolved: Table = toml::from_str(config).unwrap();
         assert_eq!(
             remedies.sentence("too blue", &resolved),
-            "the test \"too blue\" dropped the candidate; decided by [[detectors]] plugin = \
-             \"own\", config = { a = 1, b = 2 } and 1 more: the sky"
+            "the test \"too blue\" dropped the candidate; decided by detectors.0.config = \
+             { a = 1, b = 2 } (own) and 1 more: the sky"
         );
         let without = remedies.sentence("too blue", &Table::new());
         assert!(without.ends_with("; no setting decides it: the sky"), "{without}");
@@ -505,11 +514,7 @@ mod tests {
         let sprt = Value::Table(toml::from_str("plugin = 'manage-sprt'").unwrap());
         for (key, value, line) in [
             ("manager.config.hits", 3.into(), "[manager.config] hits = 3"),
-            (
-                "detectors.0.config.cost",
-                0.2.into(),
-                "[[detectors]] plugin = \"d\", config = { cost = 0.2 }",
-            ),
+            ("detectors.0.config.cost", 0.2.into(), "detectors.0.config.cost = 0.2 # d"),
             ("manager", sprt, "[manager] plugin = \"manage-sprt\""),
         ] {
             assert_eq!(Change::of(&resolved, key, &value).line, line);
@@ -529,7 +534,7 @@ mod tests {
             lines,
             [
                 "[manager] plugin = \"m\", config = { start_score = 0.5 }",
-                "[[verifiers]] plugin = \"a\", config = { weight = 2.0 }"
+                "verifiers.0.config.weight = 2.0 (a)"
             ]
         );
         assert_eq!(remedies.of("stereo pixels: speckle").unwrap().test, "stereo pixels: *");
