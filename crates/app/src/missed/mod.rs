@@ -28,6 +28,11 @@ const NOT_CONFIRMED: &str = "track: not confirmed";
 /// Time after which the track that was on a person is not told any more, ns.
 const RECENT_NS: i64 = 2_000_000_000;
 
+/// Returns true for a test that says something about the person at whose place it dropped a candidate.
+pub fn is_telling(test: &str) -> bool {
+    test != NOT_BEST
+}
+
 /// Config of a run, and the settings of the tests.
 #[derive(Clone, Copy, Debug)]
 pub struct Rules<'a> {
@@ -202,7 +207,7 @@ impl Witness {
     ) -> Option<(&str, [f64; 4])> {
         let near = self.dropped(number).filter_map(|(test, dropped)| {
             let (nearness, distance) = dropped.nearness(place)?;
-            let is_telling = test != NOT_BEST;
+            let is_telling = is_telling(test);
             let stage = rules.remedies.stage(test, rules.config);
             Some(((is_telling, nearness, stage), distance, test, dropped.box_px))
         });

@@ -13,6 +13,7 @@ use std::ops::RangeInclusive;
 
 use nalgebra::{Point2, Point3};
 pub use plan::{Blob, Plan};
+use tagalong_geometry::{HALF_HEAD_M, Rect};
 use tagalong_log::LogFrame;
 use view::{Look, View};
 
@@ -125,6 +126,11 @@ impl Moment {
     /// the odometry frame, m and degrees.
     pub fn bearing_of(&self, place: Point2<f64>) -> (f64, f64) {
         self.view.bearing_of(place)
+    }
+
+    /// Returns the box of head and shoulders of a person-sized blob, pixels.
+    pub fn upper_body(&self, blob: &Blob) -> Rect {
+        self.view.upper_body(blob.place, blob.top_m - HALF_HEAD_M)
     }
 }
 
