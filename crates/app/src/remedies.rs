@@ -497,6 +497,21 @@ mod tests {
     }
 
     #[test]
+    fn stages_are_in_the_order_in_which_a_candidate_passes_the_tests() {
+        let remedies = Remedies::new(&registry());
+        let config: Table = toml::from_str(
+            "[[detectors]]\nplugin = 'depth-template'\n[detectors.config]\nmin_body = 0.5\n\
+             discover_cost = 0.2\nfollow_radius_m = 1.0\n[manager]\nplugin = 'manage-sprt'\n\
+             [manager.config]\nmax_clutter = 1.0\nstart_score = 0.5\n",
+        )
+        .unwrap();
+        let order =
+            ["body below", "search window", "template cost", "unknown", "gate", "score", "clutter"];
+        let stages = order.map(|test| remedies.stage(test, &config));
+        assert!(stages.is_sorted_by(|a, b| a < b), "{stages:?}");
+    }
+
+    #[test]
     fn no_change_is_to_the_present_value() {
         let resolved: Table = toml::from_str(
             "[manager]\nplugin = 'manage-sprt'\n[manager.config]\nend_log_odds = -2.0\n\

@@ -166,6 +166,12 @@ mod tests {
             for blob in &moment.blobs {
                 assert!((blob.place.x - 3.0).abs() < 0.3, "the walker is 3 m away: {blob:?}");
                 assert!((1.4..1.85).contains(&blob.top_m), "{blob:?}");
+                // Its box in the image of 160 columns is on the side of the walker.
+                let (_, bearing_deg) = moment.bearing_of(blob.place);
+                let box_px = moment.upper_body(blob);
+                let right_px = box_px.centre().x - 79.5;
+                assert!(box_px.area() > 100.0, "{box_px:?}");
+                assert!(right_px.abs() < 4.0 || (right_px < 0.0) == (bearing_deg > 0.0), "{box_px:?}");
             }
         }
         assert_eq!(blobs(&Room::default().seen(40, 0.0).judge()), 0);

@@ -485,7 +485,8 @@
     const rows = Math.max(1, ...lives.map((life) => life.lane + 1));
     const motions = motionsOf(run);
     const top = motions.length ? COMMAND + 2 : 0;
-    const room = (innerHeight < 800 ? 56 : 100) * (data.runs.length > 1 ? 0.6 : 1);
+    const isSmall = innerHeight < 800 || innerWidth < 740;
+    const room = (isSmall ? 56 : 100) * (data.runs.length > 1 ? 0.72 : 1);
     const row = Math.max(LEAST_ROW, Math.min(ROW, (room - top) / rows));
     const height = top + row * rows + 5;
     target.setAttribute("viewBox", `0 0 ${widths[number]} ${height}`);
