@@ -504,7 +504,7 @@ mod tests {
              discover_cost = 0.2\nfollow_radius_m = 1.0\n[manager]\nplugin = 'manage-sprt'\n\
              [manager.config]\nmax_clutter = 1.0\nstart_score = 0.5\n",
         )
-        .unwrap();
+        .expect("a config");
         let order =
             ["body below", "search window", "template cost", "unknown", "gate", "score", "clutter"];
         let stages = order.map(|test| remedies.stage(test, &config));

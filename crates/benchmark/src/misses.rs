@@ -53,13 +53,16 @@ mod tests {
 
     #[test]
     fn a_sentence_is_kept_once_and_a_cause_without_a_test_has_a_name() {
-        let cause = |test: Option<&str>, name: &str, text: &str| Cause {
-            test: test.map(str::to_owned),
-            name: name.into(),
-            why: format!("why {name}"),
-            text: text.into(),
-            ..Cause::default()
-        };
+        fn cause(test: Option<&str>, name: &str, text: &str) -> Cause {
+            Cause {
+                test: test.map(str::to_owned),
+                name: name.into(),
+                why: format!("why {name}"),
+                text: text.into(),
+                ..Cause::default()
+            }
+        }
+
         let size = cause(Some("size"), "size", "No track began: size.");
         let far = cause(None, "too far", "No track began: too far.");
         let causes = [size.clone(), far, size].into_iter().enumerate();

@@ -350,10 +350,11 @@ impl Lane {
         let timing = self.watch.timing();
         let timing = StoredTiming { hash, machine: machine(), timing };
         let blank = TaskResult { data_lost: lost, ..blank(task) };
-        let scored = self.watch.score(truth, shots, blank, Some(rules)).and_then(|(result, recording)| {
-            let repairs = repaired(&recording.sequence, truth)?;
-            Ok((TaskResult { repairs, ..result }, recording))
-        });
+        let scored =
+            self.watch.score(truth, shots, blank, Some(rules)).and_then(|(result, recording)| {
+                let repairs = repaired(&recording.sequence, truth)?;
+                Ok((TaskResult { repairs, ..result }, recording))
+            });
         match scored {
             Ok((result, recording)) => {
                 let tests = result.funnel.iter().map(|dropped| dropped.test.as_str());

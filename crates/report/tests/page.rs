@@ -160,7 +160,8 @@ fn a_miss_rate_from_constant_scores_says_that_it_means_nothing() {
     task.image = Some(Scores { distinct_scores: 9, reports: 20, ..scores });
     let said = format!("{} on {}", task.pipeline, task.log);
     let few = Summary::new(&benchmark);
-    let logs = |of: &Summary| of.pipelines.iter().map(|p| p.figures["image.LAMR"].logs).sum::<u64>();
+    let logs =
+        |of: &Summary| of.pipelines.iter().map(|p| p.figures["image.LAMR"].logs).sum::<u64>();
     assert_eq!(logs(&few) + 1, logs(&Summary::new(&two_by_three())), "9 scores are too few");
     let page = html(&benchmark, None);
     let note = page.split("mean nothing").nth(1).unwrap();
@@ -441,7 +442,9 @@ fn a_missed_person_has_the_sentence_of_the_frame_and_other_causes_have_names() {
         task.missed.iter_mut().for_each(|missed| missed.frame = benchmark.moments[0].frame);
     }
     let page = html(&benchmark, None);
-    assert!(page.contains(&format!("✕ too far</strong><span class=\"why line\">{}", common::TOO_FAR)));
+    assert!(
+        page.contains(&format!("✕ too far</strong><span class=\"why line\">{}", common::TOO_FAR))
+    );
     let section = &page[page.find("id=\"pairs\"").expect("the pairs")..];
     let line = section.split("class=\"pair-why\">").nth(1).expect("a pair");
     let line = line.split('<').next().unwrap_or_default().replace("&quot;", "\"");
@@ -450,12 +453,15 @@ fn a_missed_person_has_the_sentence_of_the_frame_and_other_causes_have_names() {
 
 #[test]
 fn all_that_are_equal_when_printed_are_best() {
-    let task = |pipeline: &str, hota| TaskResult {
-        pipeline: pipeline.into(),
-        log: "x".into(),
-        image: Some(Scores { hota: Some(hota), tp: 1, truths: 4, truth_ids: 2, ..Scores::default() }),
-        ..TaskResult::default()
-    };
+    fn task(pipeline: &str, hota: f64) -> TaskResult {
+        let image =
+            Scores { hota: Some(hota), tp: 1, truths: 4, truth_ids: 2, ..Scores::default() };
+        let mut task = TaskResult { pipeline: pipeline.into(), ..TaskResult::default() };
+        task.log = "x".into();
+        task.image = Some(image);
+        task
+    }
+
     let tasks = vec![task("a", 0.0351), task("b", 0.0354), task("c", 0.034)];
     let summary = Summary::new(&Benchmark { tasks, ..Benchmark::default() });
     let best: Vec<&str> = summary

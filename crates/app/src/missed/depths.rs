@@ -75,8 +75,7 @@ impl Depths {
             return Some(("head too low", outside(&words, "lower", &lowest)));
         }
         let highest = limit(rules, "max_head_height_m", f64::max)?;
-        (head_m > highest.value)
-            .then(|| ("head too high", outside(&words, "higher", &highest)))
+        (head_m > highest.value).then(|| ("head too high", outside(&words, "higher", &highest)))
     }
 
     /// Returns the median of the readings in the middle of a box, m; `None` if there are too few.
@@ -87,7 +86,8 @@ impl Depths {
         if core.area() <= 0.0 {
             return None;
         }
-        let columns = (core.x / image) as usize..=((core.right() / image) as usize).min(COLUMNS - 1);
+        let columns =
+            (core.x / image) as usize..=((core.right() / image) as usize).min(COLUMNS - 1);
         let rows = (core.y / tall) as usize..=((core.bottom() / tall) as usize).min(ROWS - 1);
         let mut readings = Vec::new();
         let mut all = 0;

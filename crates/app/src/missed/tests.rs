@@ -62,7 +62,11 @@ fn the_last_test_of_a_candidate_of_the_persons_size_is_the_cause() {
         ("verifier", [300.0, 101.0, 58.0, 58.0]),
         ("score", [110.0, 110.0, 20.0, 20.0]),
     ]);
-    assert_eq!(found.test.as_deref(), Some("template cost"), "stages count, not the order of drops");
+    assert_eq!(
+        found.test.as_deref(),
+        Some("template cost"),
+        "stages count, not the order of drops"
+    );
     assert_eq!(found.box_px, Some(AT), "the nearest of one test");
     assert_eq!(
         found.text,
@@ -97,8 +101,7 @@ fn a_better_detection_of_another_person_is_the_cause_only_where_nothing_else_is(
 
 #[test]
 fn a_predicted_track_does_not_count_and_the_cause_follows() {
-    let notes =
-        FrameNotes { dropped: vec![dropped("template cost", AT)], ..FrameNotes::default() };
+    let notes = FrameNotes { dropped: vec![dropped("template cost", AT)], ..FrameNotes::default() };
     let told = cause(&notes, &[track(4, TrackStage::Predicted, 102.0)], None);
     assert!(
         told.text.starts_with(
@@ -134,8 +137,10 @@ fn depths(metres: f32) -> Depths {
 
 #[test]
 fn without_a_candidate_the_measured_cause_is_told() {
-    let notes = FrameNotes::default();
-    let of = |metres| cause(&notes, &[], Some(depths(metres)));
+    fn of(metres: f32) -> Cause {
+        cause(&FrameNotes::default(), &[], Some(depths(metres)))
+    }
+
     assert_eq!(of(f32::NAN).name, "no depth");
     assert_eq!(of(0.4).name, "too near");
     assert_eq!(of(3.0).name, "no candidate");
@@ -149,7 +154,8 @@ fn without_a_candidate_the_measured_cause_is_told() {
         "{}",
         far.text
     );
-    assert_eq!(cause(&notes, &[], None).name, "no candidate", "without depth nothing is measured");
+    let unknown = cause(&FrameNotes::default(), &[], None);
+    assert_eq!(unknown.name, "no candidate", "without depth nothing is measured");
 }
 
 #[test]
@@ -216,10 +222,9 @@ fn without_boxes_places_on_the_floor_are_compared() {
     let mut witness = Witness::default();
     witness.add(1, &FrameNotes { robot_odom: [1.0, 0.0, 0.0], ..notes }, Vec::new(), None);
     let rules = Rules { remedies: &remedies(), config: &config() };
-    let test_at = |x| {
+    for (x, test) in [(1.2, Some("score")), (3.0, None)] {
         let floor_m = witness.in_odom(1, [x, 0.0]);
-        witness.cause_at(1, &PersonAt { rect: None, floor_m }, rules).test
-    };
-    assert_eq!(test_at(1.2).as_deref(), Some("score"));
-    assert_eq!(test_at(3.0), None);
+        let cause = witness.cause_at(1, &PersonAt { rect: None, floor_m }, rules);
+        assert_eq!(cause.test.as_deref(), test, "{x} m ahead");
+    }
 }

@@ -148,9 +148,9 @@ impl Witness {
     /// Returns the dropped candidates of a frame with their tests.
     pub(super) fn dropped(&self, number: u64) -> impl Iterator<Item = (&str, &DroppedPlace)> {
         let places = self.frames.get(&number).map_or(&[][..], |sight| &sight.places);
-        places.iter().filter_map(|place| {
-            Some((self.tests.get(usize::from(place.test))?.as_str(), place))
-        })
+        places
+            .iter()
+            .filter_map(|place| Some((self.tests.get(usize::from(place.test))?.as_str(), place)))
     }
 
     /// Returns the track at a place that is on no other person: a confirmed one first, then the
@@ -201,11 +201,7 @@ impl DroppedPlace {
 }
 
 /// Compares boxes where the person has one, else places on the floor.
-fn nearness(
-    box_px: &[f32; 4],
-    floor_m: &[f32; 2],
-    person: &PersonAt,
-) -> Option<(Nearness, f64)> {
+fn nearness(box_px: &[f32; 4], floor_m: &[f32; 2], person: &PersonAt) -> Option<(Nearness, f64)> {
     let Some(rect) = person.rect else {
         let at = person.floor_m?;
         let distance = (f64::from(floor_m[0]) - at[0]).hypot(f64::from(floor_m[1]) - at[1]);

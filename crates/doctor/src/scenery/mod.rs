@@ -171,7 +171,10 @@ mod tests {
                 let box_px = moment.upper_body(blob);
                 let right_px = box_px.centre().x - 79.5;
                 assert!(box_px.area() > 100.0, "{box_px:?}");
-                assert!(right_px.abs() < 4.0 || (right_px < 0.0) == (bearing_deg > 0.0), "{box_px:?}");
+                assert!(
+                    right_px.abs() < 4.0 || (right_px < 0.0) == (bearing_deg > 0.0),
+                    "{box_px:?}"
+                );
             }
         }
         assert_eq!(blobs(&Room::default().seen(40, 0.0).judge()), 0);

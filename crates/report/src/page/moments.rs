@@ -105,7 +105,8 @@ impl Page<'_> {
                 }
             }
         };
-        let caption = html! { "Missed people, each counted in each frame, over all logs and seeds." };
+        let caption =
+            html! { "Missed people, each counted in each frame, over all logs and seeds." };
         table("Missed people by cause", &caption, &head, &body)
     }
 
@@ -211,12 +212,7 @@ impl Page<'_> {
             }
         };
         let name = format!("Pipelines on {} in frame {}", moment.log, moment.frame);
-        table(
-            &name,
-            &html! { "✕ missed, with the cause; ● found." },
-            &head,
-            &body,
-        )
+        table(&name, &html! { "✕ missed, with the cause; ● found." }, &head, &body)
     }
 }
 

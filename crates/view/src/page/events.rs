@@ -236,8 +236,7 @@ mod tests {
         a.target = Some(1);
         let events = of_run(&[0.0, 0.1], &[Some(&a), Some(&b)]);
         let texts: Vec<&str> = events.iter().map(|event| event.text.as_str()).collect();
-        let expected =
-            ["track 1 begins", "track 1 is followed from now on", "the target is lost"];
+        let expected = ["track 1 begins", "track 1 is followed from now on", "the target is lost"];
         assert_eq!(texts, expected);
     }
 
