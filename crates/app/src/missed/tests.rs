@@ -79,7 +79,7 @@ fn the_last_test_of_a_candidate_of_the_persons_size_is_the_cause() {
 #[test]
 fn a_candidate_that_overlaps_the_person_is_better_than_none() {
     // On the chest: its centre is below the person's square.
-    let chest = [110.0, 140.0, 50.0, 50.0];
+    let chest = [110.0, 152.0, 50.0, 50.0];
     assert_eq!(of_drops(&[("template cost", chest)]).test.as_deref(), Some("template cost"));
     let both = of_drops(&[("body below", AT), ("template cost", chest)]);
     assert_eq!(both.test.as_deref(), Some("body below"));
@@ -90,7 +90,7 @@ fn a_candidate_that_overlaps_the_person_is_better_than_none() {
 fn a_better_detection_of_another_person_is_the_cause_only_where_nothing_else_is() {
     let notes = FrameNotes {
         candidates: vec![candidate(NOT_BEST, AT)],
-        dropped: vec![dropped("body below", [110.0, 140.0, 50.0, 50.0])],
+        dropped: vec![dropped("body below", [110.0, 152.0, 50.0, 50.0])],
         ..FrameNotes::default()
     };
     assert_eq!(cause(&notes, &[], None).test.as_deref(), Some("body below"));
@@ -112,8 +112,12 @@ fn a_predicted_track_does_not_count_and_the_cause_follows() {
         told.text
     );
     assert_eq!(told.test.as_deref(), Some("template cost"));
-    let beside = cause(&notes, &[track(4, TrackStage::Predicted, 200.0)], None);
-    assert!(beside.text.starts_with("No track began here"), "{}", beside.text);
+    let on_the_chest =
+        SightedTrack { box_px: [102.0, 152.0, 58.0, 58.0], ..track(4, TrackStage::Predicted, 0.0) };
+    for other in [track(4, TrackStage::Predicted, 200.0), on_the_chest] {
+        let beside = cause(&notes, &[other], None);
+        assert!(beside.text.starts_with("No track began here"), "{}", beside.text);
+    }
 }
 
 #[test]

@@ -13,8 +13,11 @@ use crate::frame_notes::{FateNote, FrameNotes};
 /// Largest factor between the widths of a person's box and of a candidate for that person.
 const SIMILAR: f64 = 2.0;
 
-/// Part of the smaller of two boxes that both have in common, from which one is near the other.
-const NEAR_SHARE: f64 = 0.25;
+/// Part of the smaller of two boxes that both have in common, from which a candidate is near a person:
+/// one on the chest has little of the box around head and shoulders. Tracks have more in common with
+/// their persons.
+const NEAR_SHARE: f64 = 0.1;
+const NEAR_SHARE_OF_TRACK: f64 = 0.25;
 
 /// Distance on the floor up to which a candidate or a track is near a person, m.
 const NEAR_M: f64 = 0.75;
@@ -163,7 +166,8 @@ impl Witness {
     ) -> Option<SightedTrack> {
         let free = self.tracks(number).iter().filter(|track| !taken.contains(&i64::from(track.id)));
         let near = free.filter_map(|track| {
-            let (_, distance) = nearness(&track.box_px, &track.floor_m, person)?;
+            let (_, distance) =
+                nearness(&track.box_px, &track.floor_m, person, NEAR_SHARE_OF_TRACK)?;
             Some((track.stage == TrackStage::Tentative, distance, *track))
         });
         let best = near.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
@@ -196,12 +200,18 @@ pub(super) enum Nearness {
 impl DroppedPlace {
     /// Returns the nearness to a person, and the distance; `None` for a place of another thing.
     pub(super) fn nearness(&self, person: &PersonAt) -> Option<(Nearness, f64)> {
-        nearness(&self.box_px, &self.floor_m, person)
+        nearness(&self.box_px, &self.floor_m, person, NEAR_SHARE)
     }
 }
 
-/// Compares boxes where the person has one, else places on the floor.
-fn nearness(box_px: &[f32; 4], floor_m: &[f32; 2], person: &PersonAt) -> Option<(Nearness, f64)> {
+/// Compares boxes where the person has one, else places on the floor. Boxes that fit need no share in
+/// common.
+fn nearness(
+    box_px: &[f32; 4],
+    floor_m: &[f32; 2],
+    person: &PersonAt,
+    least_share: f64,
+) -> Option<(Nearness, f64)> {
     let Some(rect) = person.rect else {
         let at = person.floor_m?;
         let distance = (f64::from(floor_m[0]) - at[0]).hypot(f64::from(floor_m[1]) - at[1]);
@@ -215,6 +225,6 @@ fn nearness(box_px: &[f32; 4], floor_m: &[f32; 2], person: &PersonAt) -> Option<
         return Some((Nearness::Fits, distance));
     }
     let smaller = rect.area().min(other.area());
-    let is_near = smaller > 0.0 && rect.intersection(&other).area() >= NEAR_SHARE * smaller;
+    let is_near = smaller > 0.0 && rect.intersection(&other).area() >= least_share * smaller;
     is_near.then_some((Nearness::Overlaps, distance))
 }
