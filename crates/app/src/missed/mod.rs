@@ -159,7 +159,7 @@ impl Witness {
                 return Cause::of_unconfirmed(id, rules);
             }
         }
-        let cause = self.dropped_or_measured(number, place, rules);
+        let cause = self.dropped_or_measured(number, place, taken, rules);
         let lead = match (here, former) {
             (Some(track), _) => format!(
                 "Track {} is only predicted here, and a predicted track does not count as reported",
@@ -178,8 +178,14 @@ impl Witness {
     }
 
     /// Returns the test that dropped the best candidate, else what was measured at the place.
-    fn dropped_or_measured(&self, number: u64, place: &PersonAt, rules: Rules<'_>) -> Cause {
-        let Some((test, box_px)) = self.best_dropped(number, place, rules) else {
+    fn dropped_or_measured(
+        &self,
+        number: u64,
+        place: &PersonAt,
+        taken: &BTreeSet<i64>,
+        rules: Rules<'_>,
+    ) -> Cause {
+        let Some((test, box_px)) = self.best_dropped(number, place, taken, rules) else {
             let depths = self.depths(number).zip(place.rect);
             let measured = depths.and_then(|(depths, rect)| depths.cause(&rect, rules));
             let (name, why) = measured.unwrap_or_else(|| {
@@ -198,15 +204,19 @@ impl Witness {
 
     /// Returns the candidate that came nearest to a track: one of the person's size before one that
     /// merely overlaps the person, then by the test that it failed, the last one first, then by the
-    /// distance.
+    /// distance. Second detections of other people who are found are left out.
     fn best_dropped(
         &self,
         number: u64,
         place: &PersonAt,
+        taken: &BTreeSet<i64>,
         rules: Rules<'_>,
     ) -> Option<(&str, [f64; 4])> {
         let near = self.dropped(number).filter_map(|(test, dropped)| {
             let (nearness, distance) = dropped.nearness(place)?;
+            if self.is_of_another(number, dropped, place, taken) {
+                return None;
+            }
             let is_telling = is_telling(test);
             let stage = rules.remedies.stage(test, rules.config);
             Some(((is_telling, nearness, stage), distance, test, dropped.box_px))

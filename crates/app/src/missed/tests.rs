@@ -134,6 +134,18 @@ fn tracks_that_are_seen_or_not_confirmed_are_causes_of_their_own() {
     assert_eq!(stages, [TrackStage::Tentative, TrackStage::Seen, TrackStage::Predicted]);
 }
 
+#[test]
+fn a_second_detection_of_another_person_is_not_that_of_the_missed_one() {
+    let between = [119.0, 101.0, 58.0, 58.0];
+    let notes = FrameNotes { dropped: vec![dropped("occupied", between)], ..FrameNotes::default() };
+    assert_eq!(cause(&notes, &[], None).name, "occupied");
+    // Track 8 is on another person.
+    let other = cause(&notes, &[track(8, TrackStage::Seen, 120.0)], None);
+    assert_eq!(other.name, "no candidate");
+    let farther = cause(&notes, &[track(8, TrackStage::Seen, 150.0)], None);
+    assert_eq!(farther.name, "occupied");
+}
+
 fn depths(metres: f32) -> Depths {
     let camera = Camera::mounted(Pinhole::centred(500.0, 320, 240), 320, 240, 1.6, 0.0, 0.0);
     Depths::of(&DepthImage::filled(320, 240, metres), &Arc::new(camera))

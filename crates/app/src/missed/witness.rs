@@ -19,6 +19,9 @@ const SIMILAR: f64 = 2.0;
 const NEAR_SHARE: f64 = 0.1;
 const NEAR_SHARE_OF_TRACK: f64 = 0.25;
 
+/// Overlap from which a candidate is another detection of a tracked person.
+const SAME_IOU: f64 = 0.5;
+
 /// Distance on the floor up to which a candidate or a track is near a person, m.
 const NEAR_M: f64 = 0.75;
 
@@ -156,6 +159,24 @@ impl Witness {
             .filter_map(|place| Some((self.tests.get(usize::from(place.test))?.as_str(), place)))
     }
 
+    /// Returns true for a candidate at a track of another person that is nearer to that track.
+    pub(super) fn is_of_another(
+        &self,
+        number: u64,
+        dropped: &DroppedPlace,
+        person: &PersonAt,
+        taken: &BTreeSet<i64>,
+    ) -> bool {
+        let Some(rect) = person.rect else { return false };
+        let own = rect_of(&dropped.box_px);
+        let others = self.tracks(number).iter();
+        let mut others = others.filter(|track| taken.contains(&i64::from(track.id)));
+        others.any(|track| {
+            let overlap = rect_of(&track.box_px).iou(&own);
+            overlap >= SAME_IOU && overlap > rect.iou(&own)
+        })
+    }
+
     /// Returns the track at a place that is on no other person: a confirmed one first, then the
     /// nearest.
     pub(super) fn track_at(
@@ -204,6 +225,11 @@ impl DroppedPlace {
     }
 }
 
+fn rect_of(box_px: &[f32; 4]) -> Rect {
+    let [x, y, width, height] = box_px.map(f64::from);
+    Rect::new(x, y, width, height)
+}
+
 /// Compares boxes where the person has one, else places on the floor. Boxes that fit need no share in
 /// common.
 fn nearness(
@@ -217,10 +243,9 @@ fn nearness(
         let distance = (f64::from(floor_m[0]) - at[0]).hypot(f64::from(floor_m[1]) - at[1]);
         return (distance <= NEAR_M).then_some((Nearness::Fits, distance));
     };
-    let [x, y, width, height] = box_px.map(f64::from);
-    let other = Rect::new(x, y, width, height);
+    let other = rect_of(box_px);
     let distance = (other.centre() - rect.centre()).norm();
-    let is_similar = (1.0 / SIMILAR..=SIMILAR).contains(&(width / rect.width.max(1.0)));
+    let is_similar = (1.0 / SIMILAR..=SIMILAR).contains(&(other.width / rect.width.max(1.0)));
     if is_similar && rect.contains(other.centre()) {
         return Some((Nearness::Fits, distance));
     }
