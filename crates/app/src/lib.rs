@@ -25,6 +25,7 @@ pub mod frame_notes;
 pub mod input_args;
 pub mod installed;
 pub mod misfit;
+pub mod missed;
 pub mod origin;
 pub mod outcome;
 pub mod progress;

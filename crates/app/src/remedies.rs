@@ -122,9 +122,15 @@ impl Remedies {
     /// Returns the sentence that says why a test dropped a person, and the settings that decide it, by
     /// which each page and `doctor` explain it. Settings are those of a resolved config, two at most.
     pub fn sentence(&self, test: &str, resolved: &Table) -> String {
-        let Some(remedy) = self.of_config(test, resolved) else {
-            return format!("the test \"{test}\" dropped the candidate");
-        };
+        let decided = self.decided(test, resolved);
+        let decided = decided.map_or(String::new(), |decided| format!("; {decided}"));
+        format!("the test \"{test}\" dropped the candidate{decided}")
+    }
+
+    /// Returns the settings that decide a test, two at most, with the advice on it; `None` for a test
+    /// that nothing is known about.
+    pub fn decided(&self, test: &str, resolved: &Table) -> Option<String> {
+        let remedy = self.of_config(test, resolved)?;
         let mut found = remedy.settings_in(resolved);
         let further = found.len().saturating_sub(MOST_SETTINGS);
         found.truncate(MOST_SETTINGS);
@@ -137,7 +143,22 @@ impl Remedies {
             };
             format!("decided by {}{further}", Setting::in_words(&found))
         };
-        format!("the test \"{test}\" dropped the candidate; {settings}: {}", remedy.look)
+        Some(format!("{settings}: {}", remedy.look))
+    }
+
+    /// Returns the stage of a test in a resolved config: the candidates that it drops came nearer to a
+    /// track than those of a lower stage. Tests of detectors come first, in the order of their tables;
+    /// then those that no table has, those of the pipeline, and those of its other plugins.
+    pub fn stage(&self, test: &str, resolved: &Table) -> usize {
+        let all = self.drop.len();
+        let Some(remedy) = self.of_config(test, resolved) else { return all };
+        let place = self.drop.iter().position(|other| std::ptr::eq(other, remedy));
+        let place = place.unwrap_or(all);
+        let plugin = remedy.plugin.as_deref();
+        let detectors = resolved.get("detectors").and_then(Value::as_array);
+        let mut detectors = detectors.into_iter().flatten().filter_map(|one| one.get("plugin"));
+        let is_detectors = plugin.is_some() && detectors.any(|one| one.as_str() == plugin);
+        if is_detectors { place } else { all + 1 + place }
     }
 
     /// Returns the changes of a resolved config that are offered for its plugins; none of them has
@@ -485,6 +506,21 @@ mod tests {
         .unwrap();
         let told = remedies.sentence("track: not confirmed", &m_of_n);
         assert!(told.contains("{ tentative_misses = 2, confirm_hits = 3 }"), "{told}");
+    }
+
+    #[test]
+    fn stages_are_in_the_order_in_which_a_candidate_passes_the_tests() {
+        let remedies = Remedies::new(&registry());
+        let config: Table = toml::from_str(
+            "[[detectors]]\nplugin = 'depth-template'\n[detectors.config]\nmin_body = 0.5\n\
+             discover_cost = 0.2\nfollow_radius_m = 1.0\n[manager]\nplugin = 'manage-sprt'\n\
+             [manager.config]\nmax_clutter = 1.0\nstart_score = 0.5\n",
+        )
+        .expect("a config");
+        let order =
+            ["body below", "search window", "template cost", "unknown", "gate", "score", "clutter"];
+        let stages = order.map(|test| remedies.stage(test, &config));
+        assert!(stages.is_sorted_by(|a, b| a < b), "{stages:?}");
     }
 
     #[test]

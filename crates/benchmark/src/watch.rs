@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use tagalong_app::missed::{Missed, Rules, Witness, causes};
 use tagalong_app::scoring::{
     Rate, Reports, Shots, TruthFile, assemble, comparable, comparison, region, with_remedy,
 };
@@ -13,11 +14,9 @@ use tagalong_eval::{
 };
 use tagalong_log::LogFrame;
 use tagalong_pipeline::FrameReport;
-use tagalong_report::{
-    Dropped, EventRow, MissedPerson, StageTiming, TaskResult, TaskTiming, Trajectory,
-};
+use tagalong_report::{Dropped, EventRow, StageTiming, TaskResult, TaskTiming, Trajectory};
 
-use super::misses::{DroppedPlaces, missed};
+use super::misses::tell;
 use super::store::Recording;
 
 /// Height of people whose whole bodies are tracked, m: that of the truth of whole bodies.
@@ -32,7 +31,7 @@ pub struct Watch {
     reports: Reports,
     paths: BTreeMap<i64, Vec<(u32, [f64; 2])>>,
     funnel: Funnel,
-    dropped: DroppedPlaces,
+    witness: Witness,
     nis: Vec<(f64, u32)>,
     frames: u64,
     times: Timings,
@@ -51,7 +50,7 @@ impl Watch {
         }
         self.frames += 1;
         let number = u32::try_from(report.index).unwrap_or(u32::MAX);
-        self.dropped.take(number, report, &item.frame.camera);
+        self.witness.take(item, report);
         // A track that is only predicted has no box that could be scored.
         for track in report.tracks.iter().filter(|track| track.confirmed && track.seen) {
             self.track(item, number, track);
@@ -107,7 +106,8 @@ impl Watch {
         }
     }
 
-    /// Scores everything. `result` already names the task.
+    /// Scores everything. `result` already names the task. The causes of missed people are told by
+    /// the rules of the run, if there are any.
     ///
     /// # Errors
     /// Truth that contradicts itself, in a sentence.
@@ -116,6 +116,7 @@ impl Watch {
         truth: &TruthFile,
         shots: &Shots,
         mut result: TaskResult,
+        rules: Option<Rules<'_>>,
     ) -> Result<(TaskResult, Recording), String> {
         result.frames = self.frames;
         result.duration_s = shots.duration_s();
@@ -126,7 +127,7 @@ impl Watch {
         result.tracks = paths(self.paths, shots);
         let sequence = assemble(&result.log, truth, shots, self.reports, Rate(1.0));
         result.truth = truth_paths(&sequence, shots);
-        score(&sequence, truth, &self.dropped, &mut result)?;
+        score(&sequence, truth, rules.map(|rules| (&self.witness, rules)), &mut result)?;
         let size = shots.at(1).map_or((0, 0), |shot| (shot.camera.width, shot.camera.height));
         let width = size.0 as u32;
         let height = size.1 as u32;
@@ -139,19 +140,21 @@ impl Watch {
 fn score(
     sequence: &Sequence,
     truth: &TruthFile,
-    dropped: &DroppedPlaces,
+    told: Option<(&Witness, Rules<'_>)>,
     result: &mut TaskResult,
 ) -> Result<(), String> {
-    let mut image = measure_in(sequence, truth, dropped, Similarity::Iou)?;
-    let metres = measure_in(sequence, truth, dropped, Similarity::Metres)?;
+    let image = measure_in(sequence, truth, told, Similarity::Iou)?;
+    // Causes are those of the boxes if the truth has both, as the events.
+    let told = told.filter(|_| image.is_none());
+    let metres = measure_in(sequence, truth, told, Similarity::Metres)?;
     result.image = image.as_ref().map(|measured| measured.tally.scores());
     result.metres = metres.as_ref().map(|measured| measured.tally.scores());
-    if let Some(measured) = &mut image {
+    if let Some(measured) = &image {
         result.lamr_curve = measured.tally.detections.curve();
-        result.missed = std::mem::take(&mut measured.missed);
     }
-    let happened = image.or(metres).map(|measured| measured.events).unwrap_or_default();
-    result.events = happened.iter().map(|event| EventRow::new(event, 0)).collect();
+    let Some(measured) = image.or(metres) else { return Ok(()) };
+    tell(measured.missed, result);
+    result.events = measured.events.iter().map(|event| EventRow::new(event, 0)).collect();
     Ok(())
 }
 
@@ -159,24 +162,23 @@ fn score(
 struct Measured {
     tally: Tally,
     events: Vec<Event>,
-    missed: Vec<MissedPerson>,
+    missed: Vec<Missed>,
 }
 
-/// Compares in the image or on the floor, where the truth has that. People are missed in the image.
+/// Compares in the image or on the floor, where the truth has that.
 fn measure_in(
     sequence: &Sequence,
     truth: &TruthFile,
-    dropped: &DroppedPlaces,
+    told: Option<(&Witness, Rules<'_>)>,
     similarity: Similarity,
 ) -> Result<Option<Measured>, String> {
     let Some(sequence) = comparable(sequence, similarity) else { return Ok(None) };
     let comparison = comparison(truth, similarity);
     let prepared = Prepared::new(&sequence, &comparison).map_err(|error| with_remedy(&error))?;
     let (_, matches) = Clear::measure(&prepared);
-    let missed = match similarity {
-        Similarity::Iou => missed(&sequence, &prepared, &matches, dropped),
-        Similarity::Metres => Vec::new(),
-    };
+    let missed =
+        told.map(|(witness, rules)| causes(&sequence, &prepared, &matches, witness, rules));
+    let missed = missed.unwrap_or_default();
     let tally = Tally::measure(&sequence, &comparison, &SetDistance::default());
     let tally = tally.map_err(|error| error.to_string())?;
     Ok(Some(Measured { tally, events: events(&prepared, &matches), missed }))

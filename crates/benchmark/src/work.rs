@@ -6,6 +6,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressStyle};
+use tagalong_app::missed::Rules;
 use tagalong_app::outcome::{Failure, say};
 use tagalong_app::progress::Forecast;
 use tagalong_app::remedies::Remedies;
@@ -344,17 +345,20 @@ impl Lane {
         lost: bool,
         remedies: &Remedies,
     ) -> Kept {
-        if let Err(why) = &self.pipeline {
-            return failed(task, why);
-        }
+        let pipeline = match &self.pipeline {
+            Ok(pipeline) => pipeline,
+            Err(why) => return failed(task, why),
+        };
+        let rules = Rules { remedies, config: pipeline.config().values() };
         let hash = task.hash.clone();
         let timing = self.watch.timing();
         let timing = StoredTiming { hash, machine: machine(), timing };
         let blank = TaskResult { data_lost: lost, ..blank(task) };
-        let scored = self.watch.score(truth, shots, blank).and_then(|(result, recording)| {
-            let repairs = repaired(&recording.sequence, truth)?;
-            Ok((TaskResult { repairs, ..result }, recording))
-        });
+        let scored =
+            self.watch.score(truth, shots, blank, Some(rules)).and_then(|(result, recording)| {
+                let repairs = repaired(&recording.sequence, truth)?;
+                Ok((TaskResult { repairs, ..result }, recording))
+            });
         match scored {
             Ok((result, recording)) => {
                 let tests = result.funnel.iter().map(|dropped| dropped.test.as_str());
@@ -362,9 +366,8 @@ impl Lane {
                 if let Some(why) = unable(&task.pipeline, tests, has_people, remedies) {
                     return without_figures(task, Outcome::Skipped { why });
                 }
-                let deciding = deciding(&self.pipeline, &result, remedies);
-                let reasons = reasons(&self.pipeline, &result, remedies);
-                let result = TaskResult { deciding, reasons, ..result };
+                let deciding = deciding(rules, &result);
+                let result = TaskResult { deciding, ..result };
                 let stored = Stored { result, recording: Some(recording), ..Stored::default() };
                 (stored, Some(timing))
             }
@@ -394,26 +397,9 @@ fn without_figures(task: &Task, outcome: Outcome) -> Kept {
     (Stored { result, ..Stored::default() }, None)
 }
 
-/// Returns the sentences that say why the tests dropped missed people.
-fn reasons(
-    pipeline: &Result<Pipeline, String>,
-    result: &TaskResult,
-    remedies: &Remedies,
-) -> BTreeMap<String, String> {
-    let Ok(pipeline) = pipeline else { return BTreeMap::new() };
-    let config = pipeline.config().values();
-    let tests = result.missed.iter().filter_map(|missed| missed.test.as_ref());
-    tests.map(|test| (test.clone(), remedies.sentence(test, config))).collect()
-}
-
 /// Returns the lines of the config that decide the tests that dropped missed people.
-fn deciding(
-    pipeline: &Result<Pipeline, String>,
-    result: &TaskResult,
-    remedies: &Remedies,
-) -> BTreeMap<String, Vec<String>> {
-    let Ok(pipeline) = pipeline else { return BTreeMap::new() };
-    let config = pipeline.config().values();
+fn deciding(rules: Rules<'_>, result: &TaskResult) -> BTreeMap<String, Vec<String>> {
+    let Rules { remedies, config } = rules;
     let mut deciding = BTreeMap::new();
     for test in result.missed.iter().filter_map(|missed| missed.test.as_ref()) {
         if let Some(remedy) = remedies.of_config(test, config) {

@@ -4,6 +4,7 @@ use std::cell::OnceCell;
 use std::sync::Arc;
 
 use serde::Serialize;
+use tagalong_app::missed::Cause;
 use tagalong_core::{DepthImage, Frame, LaserScan};
 use tagalong_geometry::Camera;
 use tagalong_log::{InputSettings, Inputs, Inspection, LogError, LogFrame};
@@ -59,6 +60,8 @@ pub struct Evidence {
     pub trial: Trial,
     /// Tracks of the pipeline against things that come and go.
     pub coverage: Coverage,
+    /// Causes for which shapes that come and go have no track, with their numbers, most first.
+    pub causes: Vec<(Cause, usize)>,
     /// Share of the points in depth that come and go; `None` without depth.
     pub changed: Option<f64>,
     /// Built-in configs that fit the log, the best first; looked for where they are needed.

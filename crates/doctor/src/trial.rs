@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use tagalong_app::missed::Witness;
 use tagalong_core::{Frame, Funnel, RgbImage};
 use tagalong_geometry::Rect;
 use tagalong_log::LogFrame;
@@ -30,6 +31,8 @@ pub struct Trial {
     pub course: Course,
     /// Number of drops per test.
     pub funnel: Funnel,
+    /// Dropped candidates and tracks of each frame.
+    pub witness: Witness,
     /// Example pictures, by test.
     pub examples: BTreeMap<&'static str, Spread<Example>>,
     /// Reports of all frames, where pictures of them may be wanted.
@@ -60,6 +63,7 @@ impl Trial {
     fn take(&mut self, item: &LogFrame, report: FrameReport, with_pictures: bool) {
         self.course.take(&report, &item.odom_from_robot);
         self.funnel.merge(&report.funnel);
+        self.witness.take(item, &report);
         if !with_pictures {
             return;
         }

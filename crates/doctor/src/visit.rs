@@ -1,18 +1,21 @@
 //! One pass of a pipeline over a log, with all measurements.
 
 use std::cell::OnceCell;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use tagalong::logs::sources_of;
 use tagalong_app::config_file::{ConfigFile, OuterSettings, refused_log};
 use tagalong_app::input_args::InputArgs;
+use tagalong_app::missed::{Cause, PersonAt, Rules};
 use tagalong_app::outcome::Failure;
 use tagalong_app::progress::Progress;
+use tagalong_app::remedies::Remedies;
 use tagalong_config::Registry;
 use tagalong_log::{FrameSource, Input, Inspection, LogError, examine};
 use tagalong_pipeline::{Pipeline, Tunable};
 
-use super::coverage::Coverage;
+use super::coverage::{Coverage, unexplained};
 use super::evidence::{Driven, Evidence, Reading, Samples};
 use super::scenery::{Scenery, Views};
 use super::trial::Trial;
@@ -88,6 +91,7 @@ impl Visit {
             driven: Driven::default(),
             trial: Trial::default(),
             coverage: Coverage::default(),
+            causes: Vec::new(),
             changed: None,
             fitting: Vec::new(),
             alternatives: Vec::new(),
@@ -102,8 +106,29 @@ impl Visit {
         let scenery = views.judge();
         evidence.changed = (!scenery.moments.is_empty()).then_some(scenery.changed);
         evidence.coverage = Coverage::of(&evidence.trial.course, &scenery);
+        let remedies = Remedies::new(registry);
+        let rules = Rules { remedies: &remedies, config: pipeline.config().values() };
+        evidence.causes = causes(&evidence.trial, &scenery, rules);
         Ok(Self { config, pipeline, outer, tunables: settings.tune, evidence, scenery })
     }
+}
+
+/// Returns the causes for which shapes that come and go have no track, most frequent first.
+fn causes(trial: &Trial, scenery: &Scenery, rules: Rules<'_>) -> Vec<(Cause, usize)> {
+    let mut counts: BTreeMap<String, (Cause, usize)> = BTreeMap::new();
+    for moment in &trial.course.moments {
+        let Some(seen) = scenery.moment(moment.index) else { continue };
+        for blob in unexplained(moment, seen) {
+            let rect = seen.upper_body(blob);
+            let floor_m = Some([blob.place.x, blob.place.y]);
+            let place = PersonAt { rect: (rect.area() > 0.0).then_some(rect), floor_m };
+            let cause = trial.witness.cause_at(moment.index, &place, rules);
+            counts.entry(cause.why.clone()).or_insert((cause, 0)).1 += 1;
+        }
+    }
+    let mut causes: Vec<(Cause, usize)> = counts.into_values().collect();
+    causes.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+    causes
 }
 
 /// Returns the number of images, or scans, on the topic that makes the frames.

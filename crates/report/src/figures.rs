@@ -65,10 +65,26 @@ impl Figure {
         if self.higher_is_better { a > b } else { a < b }
     }
 
+    /// Returns true if `a` is better than `b` also with the decimals that a page prints.
+    pub fn better_as_printed(&self, a: f64, b: f64) -> bool {
+        let parts = 10_f64.powi(self.decimals as i32);
+        self.better((a * parts).round(), (b * parts).round())
+    }
+
     /// Returns the figures of a space.
     pub fn at(place: ComparisonSpace) -> impl Iterator<Item = &'static Self> {
         FIGURES.iter().filter(move |f| f.places.contains(&place))
     }
+}
+
+/// Different scores of which the miss rate over false reports is a curve: of fewer it is some points.
+pub const FEW_SCORES: u64 = 10;
+
+/// Returns the figure unless the reports have so few scores that it tells little.
+pub fn lamr_of_enough_scores(scores: &Scores) -> Option<f64> {
+    // Results of earlier versions did not count them.
+    let are_few = (1..FEW_SCORES).contains(&scores.distinct_scores);
+    scores.lamr.filter(|_| !are_few)
 }
 
 /// Figure that ranks the pipelines.
@@ -132,7 +148,7 @@ const FIGURES: &[Figure] = &[
         meaning: "People missed, averaged from one false report in 100 images to one in each.",
         places: &[ComparisonSpace::Image],
         compared: true,
-        of: |s| s.lamr,
+        of: lamr_of_enough_scores,
         ..RATE
     },
     Figure {

@@ -59,12 +59,25 @@ pub struct MissedPerson {
     /// Id of the person in the truth.
     pub person: i64,
     /// Test that dropped the candidate at this person; of several the one that comes last, because
-    /// it let the candidate come nearest. None if no recorded candidate was there.
+    /// it let the candidate come nearest. None for another cause.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub test: Option<String>,
     /// Box of that candidate, pixels: left, top, width, height.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub box_px: Option<[f64; 4]>,
+    /// Name of a cause that is no test, for example `no depth`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub other_cause: Option<String>,
+    /// Position of the sentence in [`TaskResult::causes`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cause: Option<usize>,
+}
+
+impl MissedPerson {
+    /// Returns the name of the cause, if it is known.
+    pub fn name(&self) -> Option<&str> {
+        self.test.as_deref().or(self.other_cause.as_deref())
+    }
 }
 
 /// Result of one pipeline on one log with one seed.
@@ -111,7 +124,7 @@ pub struct TaskResult {
     /// Events, in the order of time.
     #[serde(default)]
     pub events: Vec<EventRow>,
-    /// People missed in the image, by frame.
+    /// People missed by frame: in the image, or on the floor where the truth has no boxes.
     #[serde(default)]
     pub missed: Vec<MissedPerson>,
     /// Figures with one kind of error repaired, by boxes if the truth has them.
@@ -120,9 +133,12 @@ pub struct TaskResult {
     /// Lines of the config that decide the tests that dropped missed people, by test.
     #[serde(default)]
     pub deciding: BTreeMap<String, Vec<String>>,
-    /// Sentences that say why these tests drop people, by test.
+    /// Sentences that say why people are missed, by test or other cause.
     #[serde(default)]
     pub reasons: BTreeMap<String, String>,
+    /// Sentences that say why a person was missed in a frame, with the tracks.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub causes: Vec<String>,
 }
 
 /// Outcome of a task.

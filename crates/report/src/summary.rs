@@ -203,7 +203,7 @@ fn mark_best(pipelines: &mut [PipelineSummary], figure: &Figure, place: Comparis
     }
     let finding = pipelines.iter_mut().filter(|p| p.finds_people());
     for estimate in finding.filter_map(|p| p.figures.get_mut(&key)) {
-        let beaten = rivals.iter().any(|&rival| figure.better(rival, estimate.mean));
+        let beaten = rivals.iter().any(|&rival| figure.better_as_printed(rival, estimate.mean));
         estimate.best = estimate.logs == most && !beaten;
     }
 }

@@ -52,6 +52,7 @@ fn hostile_names_are_escaped_everywhere() {
         task.missed.iter_mut().for_each(|m| m.test = Some(HOSTILE.into()));
         task.deciding = [(HOSTILE.to_owned(), vec![HOSTILE.to_owned()])].into();
         task.reasons = [(HOSTILE.to_owned(), HOSTILE.to_owned())].into();
+        task.causes = vec![HOSTILE.to_owned(); 2];
     }
     for moment in &mut benchmark.moments {
         moment.log += HOSTILE;
@@ -156,8 +157,12 @@ fn a_miss_rate_from_constant_scores_says_that_it_means_nothing() {
     assert!(!html(&benchmark, None).contains("mean nothing"));
     let task = &mut benchmark.tasks[0];
     let scores = task.image.unwrap();
-    task.image = Some(Scores { distinct_scores: 1, reports: 9, ..scores });
+    task.image = Some(Scores { distinct_scores: 9, reports: 20, ..scores });
     let said = format!("{} on {}", task.pipeline, task.log);
+    let few = Summary::new(&benchmark);
+    let logs =
+        |of: &Summary| of.pipelines.iter().map(|p| p.figures["image.LAMR"].logs).sum::<u64>();
+    assert_eq!(logs(&few) + 1, logs(&Summary::new(&two_by_three())), "9 scores are too few");
     let page = html(&benchmark, None);
     let note = page.split("mean nothing").nth(1).unwrap();
     assert!(note.split("</p>").next().unwrap().ends_with(&format!("{said}.")), "{said}");
@@ -423,6 +428,52 @@ fn each_pair_says_in_one_line_why() {
         .map(|test| format!(" the test \"{test}\" dropped the candidate"))
         .into_iter();
     assert!(reasons.any(|reason| line.contains(&reason)), "{line}");
+}
+
+#[test]
+fn a_missed_person_has_the_sentence_of_the_frame_and_other_causes_have_names() {
+    let mut benchmark = two_by_three();
+    for task in &mut benchmark.tasks {
+        task.missed.retain(|missed| missed.other_cause.is_some());
+        task.missed.iter_mut().for_each(|missed| missed.frame = benchmark.moments[0].frame);
+    }
+    let page = html(&benchmark, None);
+    assert!(
+        page.contains(&format!("✕ too far</strong><span class=\"why line\">{}", common::TOO_FAR))
+    );
+    let section = &page[page.find("id=\"pairs\"").expect("the pairs")..];
+    let line = section.split("class=\"pair-why\">").nth(1).expect("a pair");
+    let line = line.split('<').next().unwrap_or_default().replace("&quot;", "\"");
+    assert!(line.contains("counted by frame, was \"too far\""), "{line}");
+}
+
+#[test]
+fn all_that_are_equal_when_printed_are_best() {
+    fn task(pipeline: &str, hota: f64) -> TaskResult {
+        let image =
+            Scores { hota: Some(hota), tp: 1, truths: 4, truth_ids: 2, ..Scores::default() };
+        let mut task = TaskResult { pipeline: pipeline.into(), ..TaskResult::default() };
+        task.log = "x".into();
+        task.image = Some(image);
+        task
+    }
+
+    let tasks = vec![task("a", 0.0351), task("b", 0.0354), task("c", 0.034)];
+    let summary = Summary::new(&Benchmark { tasks, ..Benchmark::default() });
+    let best: Vec<&str> = summary
+        .pipelines
+        .iter()
+        .filter(|pipeline| pipeline.figures["image.HOTA"].best)
+        .map(|pipeline| pipeline.pipeline.as_str())
+        .collect();
+    assert_eq!(best.len(), 2, "{best:?}");
+    assert!(!best.contains(&"c"), "{best:?}");
+}
+
+#[test]
+fn an_interval_in_a_cell_has_its_level() {
+    let page = html(&two_by_three(), None);
+    assert!(page.contains("<span class=\"ends\">95\u{a0}%: "));
 }
 
 #[test]

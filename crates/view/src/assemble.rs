@@ -5,8 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::page::data::RunData;
 use crate::page::events;
 use crate::page::frame::{frame_data, tests};
-use crate::page::moment::Moment;
+use crate::page::moment::{Moment, TrackState};
 use crate::page::robot::robot_data;
+use tagalong_app::missed::{Depths, Witness};
 use tagalong_app::remedies::Remedies;
 
 use crate::recording::Recording;
@@ -27,6 +28,20 @@ pub fn times(stamps: &[u64]) -> Vec<f64> {
     stamps.iter().map(|stamp| ((stamp - first) as f64 * 1e-6).round() * 1e-3).collect()
 }
 
+/// Returns what a run says about each frame of the page, numbered from 1.
+pub fn witness(run: &Recording, stamps: &[u64], depths: &[Option<Depths>]) -> Witness {
+    let by_stamp: BTreeMap<u64, &Moment> = run.moments.iter().map(|m| (stamp_of(m), m)).collect();
+    let mut witness = Witness::default();
+    for (at, stamp) in stamps.iter().enumerate() {
+        if let Some(moment) = by_stamp.get(stamp) {
+            let tracks = moment.tracks.iter().map(TrackState::sighted).collect();
+            let depths = depths.get(at).cloned().flatten();
+            witness.add(at as u64 + 1, &moment.notes, tracks, depths);
+        }
+    }
+    witness
+}
+
 /// Returns a run on the times of the page.
 pub fn run_data(run: &Recording, stamps: &[u64], remedies: &Remedies) -> RunData {
     let by_stamp: BTreeMap<u64, &Moment> = run.moments.iter().map(|m| (stamp_of(m), m)).collect();
@@ -37,6 +52,8 @@ pub fn run_data(run: &Recording, stamps: &[u64], remedies: &Remedies) -> RunData
         events: events::of_run(&times(stamps), &moments),
         tests: tests(moments.iter().flatten().map(|moment| &moment.notes), &run.config, remedies),
         hits: None,
+        causes: Vec::new(),
+        missed: BTreeMap::new(),
         robot: robot_data(&run.config),
     }
 }

@@ -8,6 +8,7 @@ use crate::page::data::{FrameData, RunData};
 use crate::page::frame::{add_trails, add_whole_people, scan_points, view_edges};
 use nalgebra::Isometry2;
 use tagalong_app::config_file::OuterSettings;
+use tagalong_app::missed::Depths;
 use tagalong_app::outcome::Failure;
 use tagalong_app::progress::Progress;
 use tagalong_app::scoring::{Shot, Shots};
@@ -28,6 +29,8 @@ pub struct Film {
     pub pictures: Pictures,
     /// Points of laser scans in the odometry frame, cm.
     pub scans: Vec<Vec<i32>>,
+    /// Depth images of the frames, reduced.
+    pub depths: Vec<Option<Depths>>,
     /// Directions of the edges of the view, rad.
     pub view_rad: Option<[f64; 2]>,
     /// Times and poses of the frames.
@@ -109,6 +112,7 @@ impl Film {
         let mut film = Self {
             pictures: Pictures::within(image_bytes, stamps.len()),
             scans: vec![Vec::new(); stamps.len()],
+            depths: vec![None; stamps.len()],
             view_rad: None,
             shots: Shots::default(),
             boxes: recordings.iter().map(boxes_of).collect(),
@@ -135,6 +139,7 @@ impl Film {
         if frame.camera.is_blind() {
             return;
         }
+        self.depths[at] = frame.depth().ok().map(|depth| Depths::of(depth, &frame.camera));
         if self.view_rad.is_none() && frame.camera.panorama().is_none() {
             self.view_rad = Some(view_edges(&frame.camera));
         }

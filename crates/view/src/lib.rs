@@ -36,13 +36,14 @@ use std::path::{Path, PathBuf};
 use crate::page::data::{PageData, RunData};
 use crate::page::html::{Heading, html};
 use clap::Args;
+use tagalong_app::missed::Rules;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, spare, write_file};
 use tagalong_app::remedies::Remedies;
 use tagalong_app::scoring::TruthFile;
 use tagalong_config::Registry;
 use tagalong_math::counted;
 
-use crate::assemble::{run_data, stamps, times};
+use crate::assemble::{run_data, stamps, times, witness};
 use crate::film::Film;
 use crate::recording::{Recording, RideFacts, Span, Window, no_frames};
 use crate::truth::PageTruth;
@@ -201,7 +202,7 @@ impl Page {
         };
         name_apart(&mut data.runs, runs);
         let left = budget.saturating_sub(length_of(&data));
-        add_log(&mut data, runs, &stamps, args, left, &mut notes)?;
+        add_log(&mut data, runs, &stamps, (args, remedies), left, &mut notes)?;
         let heading = heading(runs, &data, &notes);
         let text = html(&heading, &data).map_err(Failure::failed)?;
         Ok(Self { text, frames: data.t.len(), notes })
@@ -271,7 +272,7 @@ fn add_log(
     data: &mut PageData,
     runs: &[Recording],
     stamps: &[u64],
-    args: &ViewArgs,
+    (args, remedies): (&ViewArgs, &Remedies),
     image_bytes: usize,
     notes: &mut Vec<String>,
 ) -> Result<(), Failure> {
@@ -289,9 +290,11 @@ fn add_log(
     data.scans = film.scans();
     data.view_rad = film.view_rad;
     if let Some(truth) = read_truth(args, (&log, &first.report.log.name), &film, stamps, notes)? {
-        for run in &mut data.runs {
+        for (run, recording) in data.runs.iter_mut().zip(runs) {
+            let witness = witness(recording, stamps, &film.depths);
+            let rules = Rules { remedies, config: &recording.config };
             // Contradictions are those of the truth: the page is of use without it.
-            if let Err(why) = truth.judge(&data.t, data.image_px, run) {
+            if let Err(why) = truth.judge(&data.t, data.image_px, run, (&witness, rules)) {
                 notes.push(format!("{} is not compared with the truth: {why}", run.name));
             }
         }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use nalgebra::{Isometry2, Point2};
+use tagalong_app::missed::{Missed, Rules, Witness, causes};
 use tagalong_app::outcome::Failure;
 use tagalong_app::scoring::{
     Shots, TruthFile, TruthOptions, comparable, comparison, other_log_notes,
@@ -61,11 +62,17 @@ impl PageTruth {
         self.frames.iter().any(|frame| !frame.is_empty())
     }
 
-    /// Matches a run with the truth; adds its hits and misses.
+    /// Matches a run with the truth; adds its hits, and its misses with their causes.
     ///
     /// # Errors
     /// Truth that contradicts itself, in a sentence.
-    pub fn judge(&self, times: &[f64], size: [usize; 2], run: &mut RunData) -> Result<(), String> {
+    pub fn judge(
+        &self,
+        times: &[f64],
+        size: [usize; 2],
+        run: &mut RunData,
+        (witness, rules): (&Witness, Rules<'_>),
+    ) -> Result<(), String> {
         let sequence = self.sequence(times, size, &run.frames);
         let similarity = [Similarity::Iou, Similarity::Metres];
         let found = similarity.into_iter().find_map(|s| Some((s, comparable(&sequence, s)?)));
@@ -87,6 +94,7 @@ impl PageTruth {
             hits.push(on);
         }
         run.hits = Some(hits);
+        tell(causes(&sequence, &prepared, &matches, witness, rules), run);
         let happened = events(&prepared, &matches);
         run.events.extend(happened.iter().filter_map(described));
         run.events.sort_by_key(|event| event.i);
@@ -101,6 +109,19 @@ impl PageTruth {
             ignore_regions: regions.clone(),
         });
         Sequence { name: "page".into(), frames: frames.collect() }
+    }
+}
+
+/// Adds the causes of the misses to a run, each sentence once.
+fn tell(causes: Vec<Missed>, run: &mut RunData) {
+    let mut places: BTreeMap<String, usize> = BTreeMap::new();
+    for Missed { at, person, cause } in causes {
+        let sentences = &mut run.causes;
+        let place = *places.entry(cause.text).or_insert_with_key(|text| {
+            sentences.push(text.clone());
+            sentences.len() - 1
+        });
+        run.missed.entry(at).or_default().insert(person, place);
     }
 }
 
@@ -167,6 +188,8 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
+    use tagalong_app::frame_notes::{CandidateNote, FateNote, FrameNotes};
+
     use crate::page::data::TrackData;
 
     fn run(boxes: &[Option<[f64; 4]>]) -> RunData {
@@ -212,7 +235,25 @@ mod tests {
         assert_eq!(truth.frames[0][0].box_px, Some([10.0, 10.0, 40.0, 40.0]));
         let on = Some([10.0, 10.0, 40.0, 40.0]);
         let mut run = run(&[on, Some([300.0, 9.0, 40.0, 40.0]), on]);
-        truth.judge(&[0.0, 0.1, 0.2], [640, 480], &mut run).unwrap();
+        let remedies = tagalong_app::remedies::Remedies::default();
+        let rules = Rules { remedies: &remedies, config: &toml::Table::new() };
+        let mut witness = Witness::default();
+        let box_px = [12.0, 12.0, 40.0, 40.0];
+        let candidate = CandidateNote {
+            box_px,
+            fate: FateNote::Dropped("score".into()),
+            ..CandidateNote::default()
+        };
+        let notes = FrameNotes { candidates: vec![candidate], ..FrameNotes::default() };
+        witness.add(2, &notes, Vec::new(), None);
+        let times = [0.0, 0.1, 0.2];
+        truth.judge(&times, [640, 480], &mut run, (&witness, rules)).unwrap();
+        assert_eq!(run.missed.keys().collect::<Vec<_>>(), [&1]);
+        let cause = &run.causes[run.missed[&1][&1]];
+        assert!(
+            cause.starts_with("Track 7 ended, and no new one began: the test \"score\" dropped"),
+            "{cause}"
+        );
         let hits = run.hits.unwrap();
         assert_eq!((hits[0][&1], hits[1][&1], hits[2][&1]), (Some(7), None, Some(7)));
         let missed: Vec<usize> =

@@ -61,9 +61,9 @@ const REMEDIES: &[Remedy] = &[
         look: "people behind desks and counters",
     },
     Remedy {
-        test: "template cost",
-        settings: &["discover_cost", "follow_cost"],
-        look: "larger finds more people and more furniture",
+        test: "search window",
+        settings: &["follow_radius_m"],
+        look: "places too far from where a person was expected",
     },
     Remedy {
         test: "component size",
@@ -71,9 +71,9 @@ const REMEDIES: &[Remedy] = &[
         look: "single cells; smaller finds people far away, and noise",
     },
     Remedy {
-        test: "search window",
-        settings: &["follow_radius_m"],
-        look: "places too far from where a person was expected",
+        test: "template cost",
+        settings: &["discover_cost", "follow_cost"],
+        look: "larger finds more people and more furniture",
     },
 ];
 

@@ -39,6 +39,9 @@ pub fn missed(evidence: &Evidence) -> Option<Finding> {
             example.bearing_deg.abs()
         );
     }
+    if let Some((cause, count)) = evidence.causes.first() {
+        measured += &format!(". Cause in {count} of {}: {}", coverage.unexplained, cause.why);
+    }
     let finding = Finding::new("missed", severity, measured)
         .figure("blobs", coverage.blobs as f64)
         .figure("unexplained", coverage.unexplained as f64)

@@ -8,7 +8,7 @@ use serde::Serialize;
 pub use course::{Course, STILL_S};
 use course::{Life, Lives, Moment, Placed};
 
-use super::scenery::{self, Scenery};
+use super::scenery::{self, Blob, Scenery};
 
 /// Distance of a track from the people-sized blob that it explains, m.
 const EXPLAINS_M: f64 = 0.5;
@@ -120,8 +120,7 @@ impl Coverage {
     /// without a track.
     fn add_blobs(&mut self, moment: &Moment, seen: &scenery::Moment) -> usize {
         self.blobs += seen.blobs.len();
-        let missed: Vec<_> =
-            seen.blobs.iter().filter(|blob| !is_explained(blob.place, &moment.tracks)).collect();
+        let missed: Vec<&Blob> = unexplained(moment, seen).collect();
         self.unexplained += missed.len();
         let examples = missed.iter().map(|blob| {
             let (range_m, bearing_deg) = seen.bearing_of(blob.place);
@@ -156,6 +155,14 @@ impl Coverage {
     pub fn boxes_a_frame(&self) -> f64 {
         self.boxes as f64 / self.frames.max(1) as f64
     }
+}
+
+/// Returns the blobs of a frame that no track explains.
+pub fn unexplained<'a>(
+    moment: &Moment,
+    seen: &'a scenery::Moment,
+) -> impl Iterator<Item = &'a Blob> {
+    seen.blobs.iter().filter(|blob| !is_explained(blob.place, &moment.tracks))
 }
 
 fn is_explained(blob: Point2<f64>, tracks: &[Placed]) -> bool {

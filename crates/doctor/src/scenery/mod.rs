@@ -13,6 +13,7 @@ use std::ops::RangeInclusive;
 
 use nalgebra::{Point2, Point3};
 pub use plan::{Blob, Plan};
+use tagalong_geometry::{HALF_HEAD_M, Rect};
 use tagalong_log::LogFrame;
 use view::{Look, View};
 
@@ -126,6 +127,11 @@ impl Moment {
     pub fn bearing_of(&self, place: Point2<f64>) -> (f64, f64) {
         self.view.bearing_of(place)
     }
+
+    /// Returns the box of head and shoulders of a person-sized blob, pixels.
+    pub fn upper_body(&self, blob: &Blob) -> Rect {
+        self.view.upper_body(blob.place, blob.top_m - HALF_HEAD_M)
+    }
 }
 
 /// Returns true if other views look through a point.
@@ -160,6 +166,15 @@ mod tests {
             for blob in &moment.blobs {
                 assert!((blob.place.x - 3.0).abs() < 0.3, "the walker is 3 m away: {blob:?}");
                 assert!((1.4..1.85).contains(&blob.top_m), "{blob:?}");
+                // Its box in the image of 160 columns is on the side of the walker.
+                let (_, bearing_deg) = moment.bearing_of(blob.place);
+                let box_px = moment.upper_body(blob);
+                let right_px = box_px.centre().x - 79.5;
+                assert!(box_px.area() > 100.0, "{box_px:?}");
+                assert!(
+                    right_px.abs() < 4.0 || (right_px < 0.0) == (bearing_deg > 0.0),
+                    "{box_px:?}"
+                );
             }
         }
         assert_eq!(blobs(&Room::default().seen(40, 0.0).judge()), 0);

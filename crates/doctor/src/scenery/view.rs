@@ -2,7 +2,7 @@ use std::ops::Range;
 
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use tagalong_core::{DepthImage, Stamp, spatial_pose};
-use tagalong_geometry::{Camera, Lens};
+use tagalong_geometry::{Camera, Lens, Rect};
 use tagalong_log::LogFrame;
 
 /// Columns of a reduced image, at least.
@@ -115,6 +115,12 @@ impl View {
     /// Returns the place of the camera on the floor, odometry frame, m.
     pub fn eye(&self) -> Point2<f64> {
         self.odom_from_camera.translation.vector.xy().into()
+    }
+
+    /// Returns the upper-body square of a person at a place, with the head's centre at a height.
+    pub fn upper_body(&self, place: Point2<f64>, head_m: f64) -> Rect {
+        let in_camera = self.camera_from_odom * Point3::new(place.x, place.y, head_m);
+        self.camera.upper_body(&(self.camera.robot_from_camera * in_camera))
     }
 
     /// Returns the distance and the bearing (positive to the left) of a place from the camera, m

@@ -5,6 +5,7 @@ use tagalong_math::counted;
 
 use super::{MOST_DRAWN, Page, cell, column, number, table};
 use crate::chart::{Curve, Extent, Words, bar, key, miss_rate, plan, series_class};
+use crate::figures::FEW_SCORES;
 use crate::model::TaskResult;
 
 /// Most plans that are open, by whole logs: with more the page would be long.
@@ -18,6 +19,7 @@ impl Page<'_> {
             p {
                 "People missed against false reports, as the least score that is accepted falls. Lower is better. "
                 "LAMR is the geometric mean of the curve at nine places in the shaded band."
+                "A pipeline with fewer than " (FEW_SCORES) " different scores on a log has no line there."
                 (self.of_the_best())
             }
             p class="legend" {
@@ -28,7 +30,7 @@ impl Page<'_> {
     }
 
     fn miss_rate(&self, log: &str) -> Option<Markup> {
-        let tasks = self.drawn(log).filter(|t| !t.lamr_curve.is_empty());
+        let tasks = self.drawn(log).filter(|t| t.lamr_curve.len() as u64 >= FEW_SCORES);
         let curves: Vec<Curve<'_>> = tasks
             .map(|t| Curve {
                 name: &t.pipeline,

@@ -114,7 +114,7 @@ impl Page<'_> {
         };
         table(
             "Events by kind",
-            &html! { "Events by kind and pipeline, over all tasks." },
+            &html! { "Events by kind and pipeline, over all tasks. A miss is a time without a reported track, however many frames it lasts." },
             &head,
             &body,
         )

@@ -139,7 +139,7 @@ impl Page<'_> {
                     @if estimate.best { span class="unseen" { " best" } }
                 }
                 @if let Some(ends) = shown_interval(estimate).filter(|ends| informs(ends, figure.range)) {
-                    " " (ends_of(ends, figure.decimals))
+                    " " (labelled_ends(ends, figure.decimals))
                 }
                 @if estimate.logs < most { span class="fewer" { (counted(estimate.logs, "log")) " only" } }
                 @if let Some(picture) = picture { (picture) }
@@ -183,7 +183,7 @@ impl Page<'_> {
 fn log_cell(value: Option<f64>, best: f64, columns: usize) -> Markup {
     let Some(value) = value else { return no_cell() };
     // A single column has no best one, and a pipeline without a match is the best in nothing.
-    let best = columns > 1 && value >= best && value > 0.0;
+    let best = columns > 1 && value > 0.0 && !MAIN.better_as_printed(best, value);
     cell(
         value,
         &html! {
@@ -235,7 +235,7 @@ fn people_cell(summary: &PipelineSummary) -> Markup {
         found.estimate,
         &html! {
             span class="value" { (count) " of " (summary.people) }
-            @if let Some(ends) = found.ends().filter(|ends| informs(ends, SHARE)) { " " (ends_of(ends, 2)) }
+            @if let Some(ends) = found.ends().filter(|ends| informs(ends, SHARE)) { " " (labelled_ends(ends, 2)) }
         },
     )
 }
@@ -260,6 +260,11 @@ fn shown_interval(estimate: &Estimate) -> Option<[f64; 2]> {
 fn informs(ends: &[f64; 2], [least, most]: [f64; 2]) -> bool {
     let least_part = LEAST_INFORMATION * (most - least);
     !least_part.is_finite() || ends[0] > least + least_part || ends[1] < most - least_part
+}
+
+/// Renders the ends of an interval below the value of a cell.
+fn labelled_ends(ends: [f64; 2], decimals: usize) -> Markup {
+    html! { span class="ends" { "95\u{a0}%: " (span_of(ends, decimals)) } }
 }
 
 pub(super) fn ends_of([low, high]: [f64; 2], decimals: usize) -> Markup {
@@ -315,12 +320,14 @@ mod tests {
 
     #[test]
     fn only_a_pipeline_with_a_match_is_the_best_on_a_log() {
-        for (value, columns, is_best, why) in [
-            (0.0, 3, false, "no pipeline has a match"),
-            (0.001, 3, true, "the best"),
-            (0.5, 1, false, "no rival"),
+        for (value, best, columns, is_best, why) in [
+            (0.0, 0.0, 3, false, "no pipeline has a match"),
+            (0.001, 0.0, 3, true, "the best"),
+            (0.8151, 0.8154, 3, true, "both are printed as 0.815"),
+            (0.814, 0.8154, 3, false, "another is better"),
+            (0.5, 0.0, 1, false, "no rival"),
         ] {
-            let cell = log_cell(Some(value), 0.0, columns).into_string();
+            let cell = log_cell(Some(value), best, columns).into_string();
             assert_eq!(cell.contains('★'), is_best, "{why}");
         }
     }

@@ -45,12 +45,11 @@ impl Page<'_> {
         any.then(|| {
             html! {
                 p {
-                    "Each frame in which an annotated person has no track, by the test that dropped the candidate "
-                    "at that person: the last such test, which the candidate came nearest to passing. "
-                    em { (NO_CANDIDATE) } ": nothing that was recorded was dropped there; the detector did not look, "
-                    "or dropped so many places that not all were recorded."
+                    "Each frame in which an annotated person has no reported track, by the test that dropped the candidate "
+                    "at that person: the last such test, which the candidate came nearest to passing. A predicted "
+                    "track is not reported. " em { (NO_CANDIDATE) } ": no detector proposed anything there."
                 }
-                details class="print" { summary { "Missed people by test" } (self.missed_by_test()) }
+                details class="print" { summary { "Missed people by cause" } (self.missed_by_test()) }
                 @if !self.moments.is_empty() {
                     p {
                         "Moments in the middle of the longest misses: white and dashed the people, in colour the "
@@ -84,7 +83,7 @@ impl Page<'_> {
         let mut counts: BTreeMap<&str, BTreeMap<&str, u64>> = BTreeMap::new();
         for task in &self.view.tasks {
             for missed in &task.missed {
-                let test = missed.test.as_deref().unwrap_or(NO_CANDIDATE);
+                let test = missed.name().unwrap_or(NO_CANDIDATE);
                 *counts.entry(test).or_default().entry(&task.pipeline).or_default() += 1;
             }
         }
@@ -92,7 +91,7 @@ impl Page<'_> {
         // The test that costs most comes first.
         tests.sort_by_key(|(test, of)| (std::cmp::Reverse(of.values().sum::<u64>()), *test));
         let head = html! {
-            (column("Test", None)) (column("Why", Some("With the settings of the first pipeline that has the test")))
+            (column("Cause", None)) (column("Why", Some("With the settings of the first pipeline that has the cause")))
             @for (rank, p) in self.tried() { (self.column_of(rank, p)) }
         };
         let body = html! {
@@ -106,8 +105,9 @@ impl Page<'_> {
                 }
             }
         };
-        let caption = html! { "Frames with a missed person, over all logs and seeds." };
-        table("Missed people by test", &caption, &head, &body)
+        let caption =
+            html! { "Missed people, each counted in each frame, over all logs and seeds." };
+        table("Missed people by cause", &caption, &head, &body)
     }
 
     /// Renders the heading of a pipeline: its name, or its rank where many stand beside each other.
@@ -199,12 +199,7 @@ impl Page<'_> {
             }
         };
         let name = format!("Pipelines on {} in frame {}", moment.log, moment.frame);
-        table(
-            &name,
-            &html! { "✕ missed, by the test that dropped the candidate; ● found." },
-            &head,
-            &body,
-        )
+        table(&name, &html! { "✕ missed, with the cause; ● found." }, &head, &body)
     }
 }
 
@@ -218,8 +213,8 @@ fn fate_of(
     let miss = missed.iter().find(|(t, m)| t.pipeline == pipeline && m.person == id);
     match miss {
         Some((task, miss)) => html! {
-            strong class="bad" { "✕ " (miss.test.as_deref().unwrap_or(NO_CANDIDATE)) }
-            @if let Some(why) = miss.test.as_ref().and_then(|test| task.reasons.get(test)) { span class="why line" { (why) } }
+            strong class="bad" { "✕ " (miss.name().unwrap_or(NO_CANDIDATE)) }
+            @if let Some(why) = miss.cause.and_then(|cause| task.causes.get(cause)) { span class="why line" { (why) } }
         },
         None => match track_on(moment, pipeline, id) {
             Some(track) => html! { "● track " (track) },

@@ -26,6 +26,14 @@ struct ErrorKind {
     words: [&'static str; 2],
 }
 
+/// Cause of misses.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Costly<'a> {
+    name: &'a str,
+    /// True for a test that dropped the candidate.
+    is_test: bool,
+}
+
 /// Errors beside misses, which are named by their tests.
 const ERROR_KINDS: [ErrorKind; 2] = [
     ErrorKind {
@@ -92,11 +100,14 @@ impl Page<'_> {
         };
         let all: u64 = worse.0.values().sum();
         let costly = worse.0.iter().max_by_key(|(test, count)| (**count, std::cmp::Reverse(*test)));
-        if let Some((test, count)) = costly {
-            let misses = format!("{count} of the {all} misses of {}", worse.2);
-            let why = match *test {
+        if let Some((Costly { name, is_test }, count)) = costly {
+            let misses = format!("{count} of the {all} misses of {}, counted by frame,", worse.2);
+            let why = match *name {
                 NO_CANDIDATE => format!("{misses} had no candidate"),
-                test => format!("in {misses} the test \"{test}\" dropped the candidate"),
+                name if *is_test => {
+                    format!("in {misses} the test \"{name}\" dropped the candidate")
+                }
+                name => format!("the cause of {misses} was \"{name}\""),
             };
             line += &format!("; {why}");
         }
@@ -124,12 +135,14 @@ impl Page<'_> {
         Some(self.summary.pipeline(pipeline)?.figures.get(figure)?.mean)
     }
 
-    /// Returns the missed people in frames of a pipeline by test, over the runs that are drawn.
-    fn misses_by_test(&self, pipeline: &str) -> BTreeMap<&str, u64> {
+    /// Returns the missed people in frames of a pipeline by cause, over the runs that are drawn.
+    fn misses_by_test(&self, pipeline: &str) -> BTreeMap<Costly<'_>, u64> {
         let mut counts = BTreeMap::new();
         for task in self.view.logs.iter().filter_map(|log| self.view.drawn(pipeline, log)) {
             for missed in &task.missed {
-                *counts.entry(missed.test.as_deref().unwrap_or(NO_CANDIDATE)).or_default() += 1;
+                let name = missed.name().unwrap_or(NO_CANDIDATE);
+                let cause = Costly { name, is_test: missed.test.is_some() };
+                *counts.entry(cause).or_default() += 1;
             }
         }
         counts

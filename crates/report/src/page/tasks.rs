@@ -6,7 +6,7 @@ use tagalong_math::counted;
 use super::headline::span_of;
 use super::{MOST_UNFOLDED, Page, cell, column, no_cell, number, optional_cell, table};
 use crate::chart::key;
-use crate::figures::ComparisonSpace;
+use crate::figures::{ComparisonSpace, FEW_SCORES, lamr_of_enough_scores};
 use crate::model::{Outcome, TaskResult};
 
 /// Name of an outcome that is a fault, not a choice.
@@ -47,18 +47,21 @@ impl Page<'_> {
         })
     }
 
-    /// Names the tasks with a meaningless LAMR because all scores are equal.
+    /// Names the tasks with a meaningless LAMR because all scores, or nearly all, are equal.
     pub(super) fn constant_scores(&self) -> Option<Markup> {
         let constant: Vec<&TaskResult> = self
             .view
             .tasks
             .iter()
             .copied()
-            .filter(|task| task.image.is_some_and(|scores| scores.has_constant_scores()))
+            .filter(|task| {
+                let scores = task.image.filter(|scores| scores.reports > 1);
+                scores.is_some_and(|scores| (1..FEW_SCORES).contains(&scores.distinct_scores))
+            })
             .collect();
         (!constant.is_empty()).then(|| html! {
             p {
-                "LAMR and AP mean nothing where all reports have the same score, since no threshold tells sure reports from unsure ones: "
+                "LAMR and AP mean nothing where the reports have fewer than " (FEW_SCORES) " different scores, since no threshold tells sure reports from unsure ones; LAMR is left out: "
                 @for (i, t) in constant.iter().enumerate() { @if i > 0 { ", " } (t.pipeline) " on " (t.log) } "."
             }
         })
@@ -89,7 +92,7 @@ impl Page<'_> {
                 td { (reason(&task.outcome).map_or("done", |(outcome, _)| outcome)) }
                 (cell(task.frames as f64, &html! { (task.frames) }))
                 (cell(task.duration_s, &html! { (number(task.duration_s, 1)) }))
-                @for value in [scores.and_then(|s| s.hota), scores.and_then(|s| s.mota), scores.and_then(|s| s.idf1), scores.and_then(|s| s.lamr)] {
+                @for value in [scores.and_then(|s| s.hota), scores.and_then(|s| s.mota), scores.and_then(|s| s.idf1), scores.and_then(lamr_of_enough_scores)] {
                     (optional_cell(value, 3))
                 }
                 @for count in [scores.map(|s| s.tp), scores.map(|s| s.fp), scores.map(|s| s.fn_), scores.map(|s| s.idsw), scores.map(|s| s.frag)] {

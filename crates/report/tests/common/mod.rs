@@ -94,6 +94,7 @@ fn task(pipeline: &str, log: &str, level: f64, seed: u64, place: u64) -> TaskRes
                 .to_owned(),
         )]
         .into(),
+        causes: vec![MARGIN.to_owned(), TOO_FAR.to_owned()],
         ..TaskResult::default()
     }
 }
@@ -182,6 +183,10 @@ fn tracks(truth: &[Trajectory], wobble: &mut Wobble) -> Vec<Trajectory> {
     tracks
 }
 
+/// Sentences that say why people are missed.
+const MARGIN: &str = "No track began here: the test \"margin\" dropped the candidate.";
+pub const TOO_FAR: &str = "No track began here: the surface there is 6.2 m away.";
+
 /// Frame of the moment of each log.
 const MOMENT: u64 = 61;
 
@@ -193,6 +198,8 @@ fn missed(seed: u64) -> Vec<MissedPerson> {
         person: 1,
         test: (i != 2).then(|| test.clone()),
         box_px: (i != 2).then_some([200.0, 90.0, 70.0, 70.0]),
+        other_cause: (i == 2).then(|| "too far".to_owned()),
+        cause: Some(usize::from(i == 2)),
     });
     missed.collect()
 }

@@ -53,6 +53,12 @@ pub struct RunData {
     pub tests: BTreeMap<String, TestData>,
     /// Number of the track on each counted person of the truth, frame by frame; none for a miss.
     pub hits: Option<Vec<BTreeMap<i64, Option<i64>>>>,
+    /// Sentences that say why a person was missed.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub causes: Vec<String>,
+    /// Position of the sentence in `causes`, by the position of the frame and the person.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub missed: BTreeMap<usize, BTreeMap<i64, usize>>,
     /// The robot and the zones around it, where the run has a controller.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub robot: Option<RobotData>,
@@ -196,6 +202,8 @@ pub struct TestData {
     pub settings: Vec<String>,
     /// Sentence that says why it drops people, with two settings at most.
     pub why: String,
+    /// Stage of the test: of several at one place the last one decided.
+    pub stage: usize,
 }
 
 /// Event to jump to.

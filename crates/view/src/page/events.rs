@@ -75,7 +75,7 @@ impl Watch {
         if moment.target != self.target {
             self.target = moment.target;
             let text = match moment.target {
-                Some(id) => format!("person {id} is followed from now on"),
+                Some(id) => format!("track {id} is followed from now on"),
                 None => "the target is lost".to_owned(),
             };
             self.tell(at, "target", moment.target, text);
@@ -92,7 +92,7 @@ impl Watch {
         self.doubtful = doubts.iter().map(|doubt| doubt.id).collect();
         for doubt in doubts.iter().filter(|doubt| !before.contains(&doubt.id)) {
             let others: Vec<String> = doubt.others.iter().map(u32::to_string).collect();
-            let text = format!("person {} may be person {}", doubt.id, others.join(" or "));
+            let text = format!("track {} may be track {}", doubt.id, others.join(" or "));
             self.tell(at, "doubt", Some(doubt.id), text);
         }
         for correction in &moment.notes.corrections {
@@ -134,13 +134,13 @@ impl Watch {
 
     fn see(&mut self, at: usize, t_s: f64, id: u32) {
         match self.courses.insert(id, Course::begun(at, t_s)) {
-            None => self.tell(at, "started", Some(id), format!("person {id} is tracked")),
+            None => self.tell(at, "started", Some(id), format!("track {id} begins")),
             Some(before) if before.has_ended => {
-                let text = format!("person {id} is recognised after {:.1} s", t_s - before.seen.1);
+                let text = format!("track {id} is recognised after {:.1} s", t_s - before.seen.1);
                 self.tell(at, "recognised", Some(id), text);
             }
             Some(before) if before.is_lost => {
-                let text = format!("person {id} is seen again after {:.1} s", t_s - before.seen.1);
+                let text = format!("track {id} is seen again after {:.1} s", t_s - before.seen.1);
                 self.tell(at, "found", Some(id), text);
             }
             Some(_) => {}
@@ -156,10 +156,10 @@ impl Watch {
         let is_lost = t_s - course.seen.1 >= LOST_AFTER_S;
         let newly_lost = is_lost && !std::mem::replace(&mut course.is_lost, is_lost);
         if is_new {
-            self.tell(at, "started", Some(id), format!("person {id} is tracked"));
+            self.tell(at, "started", Some(id), format!("track {id} begins"));
         }
         if newly_lost {
-            self.tell(since, "lost", Some(id), format!("person {id} is not seen any more"));
+            self.tell(since, "lost", Some(id), format!("track {id} is not seen any more"));
         }
     }
 
@@ -174,7 +174,7 @@ impl Watch {
             }
         }
         for id in gone {
-            self.tell(at, "ended", Some(id), format!("the track of person {id} ends"));
+            self.tell(at, "ended", Some(id), format!("track {id} ends"));
         }
     }
 
@@ -236,8 +236,7 @@ mod tests {
         a.target = Some(1);
         let events = of_run(&[0.0, 0.1], &[Some(&a), Some(&b)]);
         let texts: Vec<&str> = events.iter().map(|event| event.text.as_str()).collect();
-        let expected =
-            ["person 1 is tracked", "person 1 is followed from now on", "the target is lost"];
+        let expected = ["track 1 begins", "track 1 is followed from now on", "the target is lost"];
         assert_eq!(texts, expected);
     }
 
@@ -282,7 +281,7 @@ mod tests {
         let told = of_run(&[0.0, 0.1, 0.2, 0.3, 0.4], &all);
         let told: Vec<_> =
             told.iter().map(|event| (event.i, event.kind, event.text.as_str())).collect();
-        let doubt = "person 3 may be person 4 or 7";
+        let doubt = "track 3 may be track 4 or 7";
         let corrected = "3 and 4 were the wrong way round from frame 9 on";
         assert_eq!(told, [(0, "doubt", doubt), (3, "doubt", doubt), (4, "corrected", corrected)]);
     }

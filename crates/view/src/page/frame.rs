@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry2, Point2, Point3};
 use tagalong_app::frame_notes::{CandidateNote, DriveNote, FateNote, FrameNotes};
+use tagalong_app::missed::is_telling;
 use tagalong_app::remedies::Remedies;
 use tagalong_geometry::{Camera, Rect};
 use toml::Table;
@@ -26,7 +27,9 @@ pub fn tests<'a>(
         let remedy = remedies.of_config(name, config);
         let settings = remedy.map_or_else(Vec::new, |remedy| remedy.lines(config));
         let why = remedies.sentence(name, config);
-        tests.insert(name.to_owned(), TestData { settings, why });
+        // The page compares stages alone.
+        let stage = if is_telling(name) { 1 + remedies.stage(name, config) } else { 0 };
+        tests.insert(name.to_owned(), TestData { settings, why, stage });
     }
     tests
 }

@@ -175,6 +175,9 @@ fn plan_marks() -> Markup {
     html! {
         (mark("dot", "seen"))
         (mark("dot ring", "predicted"))
+        (mark("dot ring unsure", "not confirmed yet"))
+        (mark("robot-path", "robot and its way"))
+        span data-layer="scan" { (mark("laser", "laser")) }
         span data-layer="truth" { (mark("spot", "annotated")) }
         span data-layer="truth" { (mark("spot missed", "missed")) }
         span data-layer="dropped" { (mark("crossed", "dropped")) }
@@ -197,7 +200,7 @@ fn zones() -> Markup {
 fn strip_legend() -> Markup {
     html! {
         p class="legend" {
-            (mark("life", "person with ID, seen"))
+            (mark("life", "track with ID, seen"))
             (mark("life weak", "predicted"))
             span id="legend-missed" class="group" { (mark("gap", "missed")) }
             span id="legend-drive" class="group" {
@@ -220,13 +223,12 @@ const BUTTONS: [[&str; 3]; 5] = [
 fn time_line(names: &[&str]) -> Markup {
     html! {
         section class="time" aria-label="Time line" {
-            div class="strips" aria-hidden="true" {
+            div class=(if names.len() > 1 { "strips two" } else { "strips" }) aria-hidden="true" {
                 @for (number, name) in names.iter().enumerate() {
                     @if names.len() > 1 { span class="strip-name" { (name) } }
                     svg class="strip" id=(format!("strip-{number}")) {}
                 }
             }
-            (strip_legend())
             input type="range" id="frame" min="0" max="0" value="0" step="1" aria-label="Frame";
             div class="controls" {
                 @for [id, sign, name] in BUTTONS {
@@ -243,6 +245,7 @@ fn time_line(names: &[&str]) -> Markup {
                     label { input type="checkbox" id="show-trails" checked; " trails" }
                     label id="truth-label" { input type="checkbox" id="show-truth" checked; " truth" }
                 }
+                (strip_legend())
             }
         }
     }
@@ -311,7 +314,7 @@ mod tests {
             ..CandidateData::default()
         }];
         let frame = FrameData { found, ..FrameData::default() };
-        let test = TestData { settings: vec![HOSTILE.into()], why: HOSTILE.into() };
+        let test = TestData { settings: vec![HOSTILE.into()], why: HOSTILE.into(), stage: 0 };
         let run = RunData {
             name: HOSTILE.into(),
             frames: vec![Some(frame)],

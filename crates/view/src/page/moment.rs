@@ -3,6 +3,7 @@
 use nalgebra::Isometry2;
 use serde::Deserialize;
 use tagalong_app::frame_notes::FrameNotes;
+use tagalong_app::missed::{SightedTrack, TrackStage};
 use tagalong_core::Track;
 use tagalong_geometry::Camera;
 use tagalong_pipeline::FrameReport;
@@ -55,6 +56,16 @@ impl Moment {
 }
 
 impl TrackState {
+    /// Returns the track as the search for a cause of a miss needs it.
+    pub fn sighted(&self) -> SightedTrack {
+        SightedTrack {
+            id: self.id,
+            stage: TrackStage::of(self.confirmed, self.seen),
+            box_px: self.upper_body_px.map(|v| v as f32),
+            floor_m: [self.head_odom_m[0] as f32, self.head_odom_m[1] as f32],
+        }
+    }
+
     fn of(track: &Track, odom_from_robot: &Isometry2<f64>) -> Self {
         let person = &track.estimate.person;
         let head = person.position;

@@ -158,7 +158,7 @@
       }
     }
     // Below the labels, so that it hides none.
-    if (state.question) parts.push(outline(state.question.box, "asked", k, 2, "the place in question"));
+    if (state.question && state.question.box) parts.push(outline(state.question.box, "asked", k, 2, "the place in question"));
     if (frame) {
       const taken = [];
       for (const track of frame.tracks) {
@@ -171,7 +171,7 @@
   };
 
   const describe = (track) =>
-    `person ${track.id}, ${stateOf(track)}, ${fixed(track.d, 1)} m away, ${fixed(Math.hypot(...track.v), 1)} m/s`;
+    `track ${track.id}, ${stateOf(track)}, ${fixed(track.d, 1)} m away, ${fixed(Math.hypot(...track.v), 1)} m/s`;
 
   // ---- plan ------------------------------------------------------------------------------------
 
@@ -207,6 +207,13 @@
     const centre = fits || !frame ? [whole.x, whole.y] : frame.robot;
     const height = fits ? Math.max(whole.h, whole.w / ASPECT, 5) : 14;
     return { x: centre[0], y: centre[1], w: height * ASPECT, h: height };
+  };
+
+  // The part of the plan that is seen: the picture may be wider or higher than its window.
+  const visible = (element, area) => {
+    const { width, height } = element.getBoundingClientRect();
+    const aspect = height > 0 ? width / height : ASPECT;
+    return { ...area, w: Math.max(area.w, area.h * aspect), h: Math.max(area.h, area.w / aspect) };
   };
 
   const gridLines = (area, k) => {
@@ -365,7 +372,7 @@
     const area = windowAt(frame);
     target.setAttribute("viewBox", `${area.x - area.w / 2} ${-area.y - area.h / 2} ${area.w} ${area.h}`);
     const k = unitsPerPixel(target, area.w, area.h);
-    const parts = gridLines(area, k);
+    const parts = gridLines(visible(target, area), k);
     const scan = data.scans && data.scans[state.at];
     for (let i = 0; scan && i < scan.length; i += 2) {
       parts.push(svg("circle", { class: "scan", cx: scan[i] / 100, cy: -scan[i + 1] / 100, r: 1.6 * k }));
@@ -384,6 +391,10 @@
       parts.push(...[...frame.tracks].reverse().map((track) => personMark(run, track, k)));
       parts.push(...planIds(frame.tracks, k));
     }
+    if (state.question && state.question.at) {
+      const [x, y] = state.question.at;
+      parts.push(svg("circle", { class: "asked-spot", cx: x, cy: -y, r: 15 * k, "stroke-width": 2 * k }));
+    }
     target.replaceChildren(...parts.filter(Boolean));
   };
 
@@ -391,7 +402,8 @@
 
   // A layer that is off has no marks to explain.
   const drawLegends = () => {
-    const isOn = { truth: data.truth && id("show-truth").checked, dropped: id("show-dropped").checked };
+    const isOn = { truth: data.truth && id("show-truth").checked, dropped: id("show-dropped").checked,
+      scan: Boolean(data.scans) };
     for (const mark of document.querySelectorAll("[data-layer]")) mark.hidden = !isOn[mark.dataset.layer];
   };
 
@@ -459,7 +471,7 @@
   const lifeMarks = (life, number, y, row) => {
     const parts = stretches(life.points).map((part) =>
       svg("line", { class: `life ${colour(life.track)}${part.seen ? "" : " weak"}`, x1: column(part.from, number), x2: Math.max(column(part.to, number), column(part.from, number) + 1.5), y1: y, y2: y, "stroke-width": row - 3 },
-        svg("title", {}, `person ${life.track}`)));
+        svg("title", {}, `track ${life.track}`)));
     if (row < LETTERS_ROW) return parts;
     const x = Math.min(column(life.points[0][0], number) + 3, widths[number] - 14);
     parts.push(svg("text", { class: "strip-id", x, y: y + 0.33 * row, "font-size": Math.max(9, row - 2), "stroke-width": 2.5 }, String(life.track)));
@@ -473,7 +485,8 @@
     const rows = Math.max(1, ...lives.map((life) => life.lane + 1));
     const motions = motionsOf(run);
     const top = motions.length ? COMMAND + 2 : 0;
-    const room = (innerHeight < 800 ? 60 : 100) * (data.runs.length > 1 ? 0.75 : 1);
+    const isSmall = innerHeight < 800 || innerWidth < 740;
+    const room = (isSmall ? 56 : 100) * (data.runs.length > 1 ? 0.72 : 1);
     const row = Math.max(LEAST_ROW, Math.min(ROW, (room - top) / rows));
     const height = top + row * rows + 5;
     target.setAttribute("viewBox", `0 0 ${widths[number]} ${height}`);
@@ -513,7 +526,7 @@
     const row = (track) => el("tr", {},
       el("th", { scope: "row" }, el("span", { class: `swatch ${colour(track.id)}` }), String(track.id)),
       el("td", {}, stateOf(track)), number(`${fixed(track.d, 2)} m`), number(`${fixed(Math.hypot(...track.v), 2)} m/s`), number(fixed(track.p, 2)));
-    return place.replaceChildren(table(`People of ${run.name}`, ["Person", "State", "Distance", "Speed", "Probability"], tracks.map(row)));
+    return place.replaceChildren(table(`People of ${run.name}`, ["Track", "State", "Distance", "Speed", "Probability"], tracks.map(row)));
   };
 
   const settings = (run, test) => {
@@ -551,7 +564,7 @@
     const frame = frameOf(run, state.at);
     const now = frame && frame.drive;
     if (!now) return place.replaceChildren(el("p", { class: "soft" }, "The run has no controller: it follows nobody."));
-    const target = frame.target === undefined || frame.target === null ? "no person" : `person ${frame.target}`;
+    const target = frame.target === undefined || frame.target === null ? "nobody" : `track ${frame.target}`;
     const sure = now.belief === null ? "" : `, the same person with probability ${fixed(now.belief, 2)}`;
     const row = (name, sign, text) => el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, el("strong", {}, sign)), el("td", {}, text));
     return place.replaceChildren(table(`Target and command of ${run.name}`, ["Part", "State", "Meaning"], [
@@ -573,9 +586,15 @@
     return Math.hypot(dx, dy) <= Math.max(reach * 0.75, 0.03 * WIDTH);
   };
 
+  // Without a box places on the floor are compared.
+  const NEAR_M = 0.75;
+  const isAt = (thing, question) => (question.box ? isNear(thing.box, question)
+    : Math.hypot(thing.at[0] - question.at[0], thing.at[1] - question.at[1]) <= NEAR_M);
+  const hasPlace = (person) => Boolean(person.box || person.at);
+
   const droppedNear = (frame, question) => [
-    ...frame.found.filter((c) => c.test && isNear(c.box, question)).map((c) => ({ test: c.test, text: `${c.by}, log-odds ${fixed(c.score, 1)}` })),
-    ...frame.dropped.flatMap((test) => (test.boxes || []).filter((box) => isNear(box, question)).map(() => ({ test: test.test, text: "a place that did not become a candidate" }))),
+    ...frame.found.filter((c) => c.test && isAt(c, question)).map((c) => ({ test: c.test, text: `${c.by}, log-odds ${fixed(c.score, 1)}` })),
+    ...frame.dropped.flatMap((test) => (test.boxes || []).filter((box) => question.box && isNear(box, question)).map(() => ({ test: test.test, text: "a place that did not become a candidate" }))),
   ];
 
   const grouped = (items) => {
@@ -593,57 +612,25 @@
     return [...counts].sort((a, b) => b[1] - a[1]);
   };
 
-  const tracksNear = (frame, question) => frame.tracks.filter((track) => isNear(track.box, question));
-
-  // Tracks near a question that no other annotated person has.
-  const freeTracks = (run, at, question) => {
-    const hits = (run.hits && run.hits[at]) || {};
-    const taken = Object.entries(hits).filter(([person]) => Number(person) !== question.person).map(([, track]) => track);
-    return tracksNear(run.frames[at], question).filter((track) => question.person === undefined || !taken.includes(track.id));
+  // The test of the last stage that dropped something here.
+  const lastTest = (run, frame, question) => {
+    const tests = droppedNear(frame, question).map((item) => item.test);
+    const stage = (test) => (run.tests[test] ? run.tests[test].stage : 0);
+    return tests.sort((a, b) => stage(b) - stage(a))[0];
   };
 
-  // The track that was confirmed at this place shortly before, and is not here any more.
-  const LAST_S = 2;
-  const lastNear = (run, question) => {
-    for (let i = state.at - 1; i >= 0 && data.t[state.at] - data.t[i] <= LAST_S; i -= 1) {
-      const before = run.frames[i] && freeTracks(run, i, question).find((track) => track.state !== "tentative");
-      if (before) return { id: before.id, s: data.t[state.at] - data.t[i] };
-    }
-    return null;
-  };
-
-  // The test that decided: of the candidate here with the best log-odds, else of the place that was
-  // dropped here in most of the frames around.
-  const decidingTest = (run, frame, question) => {
-    const candidates = frame.found.filter((c) => c.test && isNear(c.box, question));
-    if (candidates.length) return candidates.reduce((best, c) => (c.score > best.score ? c : best)).test;
-    const here = new Set(droppedNear(frame, question).map((item) => item.test));
-    const common = aroundCounts(run, question).find(([test]) => here.has(test));
-    return common ? common[0] : null;
-  };
-
-  const sentence = (run, test) => (run.tests[test] && run.tests[test].why) || `the test "${test}" dropped the candidate`;
-
-  // The one cause, as a sentence.
+  // Of an annotated person who is missed the data has the cause; of any other place the page tells what
+  // is there.
   const causeOf = (run, frame, question) => {
-    const here = run.frames[state.at] ? freeTracks(run, state.at, question) : tracksNear(frame, question);
-    const [track] = here.sort((a, b) => (a.state === "tentative") - (b.state === "tentative"));
-    if (track && track.state !== "tentative" && isMissed(run, state.at, question.person)) {
-      return `Person ${track.id} is tracked near here, ${stateOf(track)}; its box does not overlap the annotated one enough.`;
-    }
-    if (track && track.state !== "tentative") return `Not missed: person ${track.id} is tracked here, ${stateOf(track)}.`;
-    if (track) {
-      return `Tracked here, and not confirmed yet: track ${track.id}, probability ${fixed(track.p, 2)}. It is reported once the track manager confirms it.`;
-    }
-    const test = decidingTest(run, frame, question);
-    const why = test ? sentence(run, test) : "no detector proposed a candidate near this place";
-    const last = lastNear(run, question);
-    if (!last) return `No track began here: ${why}.`;
-    const ago = `${fixed(last.s, 1)} s before`;
-    // A track that is on another person now has not ended.
-    const isElsewhere = frame.tracks.some((other) => other.id === last.id);
-    const course = isElsewhere ? `Track ${last.id} was here ${ago} and is elsewhere now` : `Track ${last.id} ended ${ago}`;
-    return `${course}, and no new one began: ${why}.`;
+    const missed = (run.missed || {})[state.at] || {};
+    if (question.person !== undefined && missed[question.person] !== undefined) return run.causes[missed[question.person]];
+    const hit = ((run.hits || [])[state.at] || {})[question.person];
+    if (hit) return `Annotated person ${question.person} is found as track ${hit}.`;
+    const here = frame.tracks.filter((track) => isAt(track, question));
+    const tracks = here.map((track) => `track ${track.id}, ${stateOf(track)}`).join("; ") || "no track";
+    const test = lastTest(run, frame, question);
+    const why = run.tests[test] ? run.tests[test].why : "no recorded candidate was dropped";
+    return `At this place: ${tracks}; ${why}.`;
   };
 
   // Many tests drop thousands of places and record some of them.
@@ -675,28 +662,39 @@
     id("question").textContent = question ? question.text : INVITATION;
     draw();
   };
-  const INVITATION = id("question").textContent;
+  const INVITATION = !WIDTH && data.truth ? "Choose a missed person, or an event \"missed\"." : id("question").textContent;
   const HALF_PX = 0.04;
 
   const askAt = (event) => {
     const target = event.currentTarget;
     const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(target.getScreenCTM().inverse());
     const half = HALF_PX * WIDTH;
+    const missed = missedAt(point);
+    if (missed) return askPerson(missed);
     pause();
     ask({ box: [point.x - half, point.y - half, 2 * half, 2 * half], text: `At column ${Math.round(point.x)}, row ${Math.round(point.y)}:` });
+    return undefined;
+  };
+
+  // The missed person at a point of the image: of several the one with the smallest box, which is behind the others.
+  const missedAt = (point) => {
+    const holds = ([x, y, w, h]) => x <= point.x && point.x < x + w && y <= point.y && point.y < y + h;
+    const here = truthAt(state.at).filter((person) => person.box && holds(person.box)
+      && data.runs.some((run) => isMissed(run, state.at, person.id)));
+    return here.sort((a, b) => a.box[2] * a.box[3] - b.box[2] * b.box[3])[0];
   };
 
   const atPerson = (person) => `At annotated person ${person}:`;
   const askPerson = (person) => {
     pause();
-    ask({ box: person.box, text: atPerson(person.id), person: person.id });
+    ask({ box: person.box, at: person.at, text: atPerson(person.id), person: person.id });
   };
 
   // Keeps the question on the annotated person while time goes on.
   const followQuestion = () => {
     if (!state.question || state.question.person === undefined) return;
-    const person = truthAt(state.at).find((other) => other.id === state.question.person && other.box);
-    if (person) state.question.box = person.box;
+    const person = truthAt(state.at).find((other) => other.id === state.question.person && hasPlace(other));
+    if (person) [state.question.box, state.question.at] = [person.box, person.at];
     const text = person ? atPerson(state.question.person)
       : `Annotated person ${state.question.person} is not in this frame; at the last place:`;
     // The same text again would be read out again.
@@ -705,7 +703,7 @@
 
   const missedButtons = () => {
     const place = id("missed");
-    const missed = truthAt(state.at).filter((person) => person.box && data.runs.some((run) => isMissed(run, state.at, person.id)));
+    const missed = truthAt(state.at).filter((person) => hasPlace(person) && data.runs.some((run) => isMissed(run, state.at, person.id)));
     place.hidden = !missed.length;
     const button = (person) => {
       const by = data.runs.length > 1 ? ` by ${data.runs.filter((run) => isMissed(run, state.at, person.id)).map((run) => run.name).join(" and ")}` : "";
@@ -728,7 +726,7 @@
   const goToEvent = (event) => {
     pause();
     show(event.i);
-    const person = truthAt(event.i).find((other) => other.id === event.person && other.box);
+    const person = truthAt(event.i).find((other) => other.id === event.person && hasPlace(other));
     if (event.kind === "missed" && person) askPerson(person);
   };
 
@@ -884,7 +882,7 @@
     image.setAttribute("viewBox", `0 0 ${WIDTH || 4} ${HEIGHT || 3}`);
     id(`picture-${number}`).hidden = !WIDTH;
     image.closest(".views").classList.toggle("alone", !WIDTH);
-    id("why").hidden = !WIDTH;
+    id("why").hidden = !WIDTH && !data.truth;
   };
 
   const prepare = () => {

@@ -1,0 +1,153 @@
+//! Depth image of a frame, reduced to what tells why nothing was proposed at a place.
+
+use std::sync::Arc;
+
+use tagalong_core::DepthImage;
+use tagalong_geometry::{Camera, Rect};
+use toml::{Table, Value};
+
+use super::Rules;
+
+/// Columns and rows of cells.
+const COLUMNS: usize = 32;
+const ROWS: usize = 24;
+
+/// Readings of a cell in each direction.
+const TAPS: usize = 3;
+
+/// Units of a reading for a metre: a byte reaches to 25 m.
+const UNITS: f32 = 10.0;
+
+/// Share of the cells of a box that must have depth.
+const LEAST_SHARE: f64 = 0.2;
+
+/// Part of a box, about its centre, in which the person is in front.
+const CORE: f64 = 0.5;
+
+/// Depth image of a frame in coarse cells, with its camera.
+#[derive(Clone, Debug)]
+pub struct Depths {
+    /// Row by row, in tenths of a metre; 0 without a reading.
+    cells: Vec<u8>,
+    camera: Arc<Camera>,
+}
+
+/// Limit of a detector, and the line of the config with it.
+struct Limit {
+    value: f64,
+    line: String,
+}
+
+impl Depths {
+    /// Reduces a depth image.
+    pub fn of(depth: &DepthImage, camera: &Arc<Camera>) -> Self {
+        let mut cells = Vec::with_capacity(COLUMNS * ROWS);
+        for row in 0..ROWS {
+            for column in 0..COLUMNS {
+                cells.push(cell(depth, column, row));
+            }
+        }
+        Self { cells, camera: Arc::clone(camera) }
+    }
+
+    /// Returns the name and the sentence of a cause that can be measured at a person for whom no
+    /// candidate was proposed. `None` if there is none, and where a detector needs no depth.
+    pub(super) fn cause(&self, person: &Rect, rules: Rules<'_>) -> Option<(&'static str, String)> {
+        // A detector without such a limit looks at other things than depth.
+        let least_m = limit(rules, "min_depth_m", f64::min)?;
+        let most_m = limit(rules, "max_depth_m", f64::max)?;
+        let Some(depth_m) = self.median_m(person) else {
+            let why = "no detector proposed a candidate here: the depth image has no reading at the \
+                       person";
+            return Some(("no depth", why.to_owned()));
+        };
+        let words = format!("the surface there is {depth_m:.1} m away");
+        if depth_m < least_m.value {
+            return Some(("too near", outside(&words, "nearer", &least_m)));
+        }
+        if depth_m > most_m.value {
+            return Some(("too far", outside(&words, "farther", &most_m)));
+        }
+        let head_m = self.camera.head_of(person, depth_m).z;
+        let words = format!("the head is about {head_m:.1} m above the floor");
+        let lowest = limit(rules, "min_head_height_m", f64::min)?;
+        if head_m < lowest.value {
+            return Some(("head too low", outside(&words, "lower", &lowest)));
+        }
+        let highest = limit(rules, "max_head_height_m", f64::max)?;
+        (head_m > highest.value).then(|| ("head too high", outside(&words, "higher", &highest)))
+    }
+
+    /// Returns the median of the readings in the middle of a box, m; `None` if there are too few.
+    fn median_m(&self, person: &Rect) -> Option<f64> {
+        let image = self.camera.width as f64 / COLUMNS as f64;
+        let tall = self.camera.height as f64 / ROWS as f64;
+        let core = person.inflated(CORE - 1.0).clipped(self.camera.width, self.camera.height);
+        if core.area() <= 0.0 {
+            return None;
+        }
+        let columns =
+            (core.x / image) as usize..=((core.right() / image) as usize).min(COLUMNS - 1);
+        let rows = (core.y / tall) as usize..=((core.bottom() / tall) as usize).min(ROWS - 1);
+        let mut readings = Vec::new();
+        let mut all = 0;
+        for row in rows {
+            for column in columns.clone() {
+                let reading = self.cells[row * COLUMNS + column];
+                all += 1;
+                readings.extend((reading > 0).then_some(reading));
+            }
+        }
+        if (readings.len() as f64) < LEAST_SHARE * f64::from(all) || readings.is_empty() {
+            return None;
+        }
+        readings.sort_unstable();
+        Some(f64::from(readings[readings.len() / 2]) / f64::from(UNITS))
+    }
+}
+
+/// Returns the median of a cell's readings, 0 if less than half of them are there.
+fn cell(depth: &DepthImage, column: usize, row: usize) -> u8 {
+    let mut readings: Vec<f32> = Vec::with_capacity(TAPS * TAPS);
+    for tap in 0..TAPS * TAPS {
+        let x = (column * TAPS + tap % TAPS) * depth.width() / (COLUMNS * TAPS);
+        let y = (row * TAPS + tap / TAPS) * depth.height() / (ROWS * TAPS);
+        let metres = depth.get(x as i64, y as i64);
+        readings.extend(metres.filter(|metres| metres.is_finite() && *metres > 0.0));
+    }
+    if readings.len() * 2 < TAPS * TAPS {
+        return 0;
+    }
+    readings.sort_unstable_by(f32::total_cmp);
+    (readings[readings.len() / 2] * UNITS).round().clamp(1.0, 255.0) as u8
+}
+
+/// Returns the limit of the detectors together, if all of them have it.
+fn limit(rules: Rules<'_>, key: &str, wider: fn(f64, f64) -> f64) -> Option<Limit> {
+    let detectors = rules.config.get("detectors").and_then(Value::as_array)?;
+    let mut widest: Option<Limit> = None;
+    for detector in detectors.iter().filter_map(Value::as_table) {
+        let config = detector.get("config").and_then(Value::as_table)?;
+        let value = number(config, key)?;
+        let is_wider = widest.as_ref().is_none_or(|one| wider(one.value, value) != one.value);
+        if is_wider {
+            let plugin = detector.get("plugin").and_then(Value::as_str).unwrap_or_default();
+            let line =
+                format!("[[detectors]] plugin = \"{plugin}\", config = {{ {key} = {value:?} }}");
+            widest = Some(Limit { value, line });
+        }
+    }
+    widest
+}
+
+fn number(config: &Table, key: &str) -> Option<f64> {
+    let value = config.get(key)?;
+    value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
+}
+
+fn outside(words: &str, than: &str, limit: &Limit) -> String {
+    format!(
+        "no detector proposed a candidate here: {words}, {than} than the detectors look; decided by {}",
+        limit.line
+    )
+}

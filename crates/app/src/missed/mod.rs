@@ -1,0 +1,249 @@
+//! Cause for which a person has no reported track in a frame. It is the one rule of the page of `view`,
+//! the report of `bench` and `doctor`, which all say the same sentence.
+//!
+//! A [`Witness`] keeps what a run says about each frame; [`causes`] looks there for each person that a
+//! comparison with the truth misses, and [`Witness::cause_at`] for any other place.
+
+mod depths;
+mod witness;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use tagalong_eval::{Match, Prepared, Role, Sequence};
+use tagalong_geometry::Rect;
+use toml::Table;
+
+use crate::remedies::Remedies;
+
+pub use depths::Depths;
+pub use witness::{SightedTrack, TrackStage, Witness};
+
+/// Test that a detection near a known person fails if that person has a better one. It says nothing
+/// about other people there.
+const NOT_BEST: &str = "not the best detection";
+
+/// Test that a track fails as long as its manager doubts it.
+const NOT_CONFIRMED: &str = "track: not confirmed";
+
+/// Time after which the track that was on a person is not told any more, ns.
+const RECENT_NS: i64 = 2_000_000_000;
+
+/// Returns true for a test that says something about the person at whose place it dropped a candidate.
+pub fn is_telling(test: &str) -> bool {
+    test != NOT_BEST
+}
+
+/// Config of a run, and the settings of the tests.
+#[derive(Clone, Copy, Debug)]
+pub struct Rules<'a> {
+    /// Settings of the tests.
+    pub remedies: &'a Remedies,
+    /// Resolved config of the run.
+    pub config: &'a Table,
+}
+
+/// Person at a place, as far as it is known.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PersonAt {
+    /// Box of head and shoulders, pixels.
+    pub rect: Option<Rect>,
+    /// Place on the floor, odometry frame, m.
+    pub floor_m: Option<[f64; 2]>,
+}
+
+/// Track that was on a person before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Former {
+    id: i64,
+    stamp_ns: i64,
+}
+
+/// Cause for which a person has no reported track.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Cause {
+    /// Test that dropped the candidate at the person; none for other causes.
+    pub test: Option<String>,
+    /// Name of the cause in a table: the test, or a few words.
+    pub name: String,
+    /// Box of that candidate, pixels: left, top, width, height.
+    pub box_px: Option<[f64; 4]>,
+    /// Cause in a sentence, without the tracks: the same for all people of one name.
+    pub why: String,
+    /// The whole sentence.
+    pub text: String,
+}
+
+/// Person without a reported track in a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Missed {
+    /// Position of the frame in the sequence.
+    pub at: usize,
+    /// ID of the person in the truth.
+    pub person: i64,
+    /// The cause.
+    pub cause: Cause,
+}
+
+/// Returns the people that count and have no track, frame by frame, each with the cause. The witness has
+/// the frames of the sequence by their numbers, from 1.
+pub fn causes(
+    sequence: &Sequence,
+    prepared: &Prepared,
+    matches: &[Vec<Match>],
+    witness: &Witness,
+    rules: Rules<'_>,
+) -> Vec<Missed> {
+    let mut all = Vec::new();
+    let mut former: BTreeMap<i64, Former> = BTreeMap::new();
+    let frames = sequence.frames.iter().zip(&prepared.frames).zip(matches).enumerate();
+    for (at, ((frame, compared), matches)) in frames {
+        let mut found = BTreeSet::new();
+        let mut taken = BTreeSet::new();
+        for pair in matches {
+            let person = prepared.truth_ids[compared.truths[pair.row as usize] as usize];
+            let id = prepared.track_ids[compared.tracks[pair.col as usize] as usize];
+            former.insert(person, Former { id, stamp_ns: frame.stamp_ns });
+            found.insert(person);
+            taken.insert(id);
+        }
+        for truth in frame.truths.iter().filter(|truth| truth.role == Role::Counts) {
+            let is_compared =
+                compared.truths.iter().any(|row| prepared.truth_ids[*row as usize] == truth.id);
+            if found.contains(&truth.id) || !is_compared {
+                continue;
+            }
+            let number = at as u64 + 1;
+            let place = PersonAt {
+                rect: truth.region.map(|r| Rect::new(r.x, r.y, r.width, r.height)),
+                floor_m: truth.floor_m.and_then(|floor| witness.in_odom(number, floor)),
+            };
+            let last = former.get(&truth.id).copied();
+            let last = last.filter(|last| frame.stamp_ns - last.stamp_ns <= RECENT_NS);
+            let cause = witness.explain(number, &place, &taken, last, rules);
+            all.push(Missed { at, person: truth.id, cause });
+        }
+    }
+    all
+}
+
+impl Witness {
+    /// Returns the cause for which nobody is reported at a place. Tracks that are seen elsewhere and
+    /// overlap it in the image are other people.
+    pub fn cause_at(&self, number: u64, place: &PersonAt, rules: Rules<'_>) -> Cause {
+        let seen = self.tracks(number).iter().filter(|track| track.stage == TrackStage::Seen);
+        let taken = seen.map(|track| i64::from(track.id)).collect();
+        self.explain(number, place, &taken, None, rules)
+    }
+
+    fn explain(
+        &self,
+        number: u64,
+        place: &PersonAt,
+        taken: &BTreeSet<i64>,
+        former: Option<Former>,
+        rules: Rules<'_>,
+    ) -> Cause {
+        let here = self.track_at(number, place, taken);
+        if let Some(track) = here {
+            let id = track.id;
+            if track.stage == TrackStage::Seen {
+                return Cause::of_place(
+                    "beside the person",
+                    format!(
+                        "Track {id} is seen here, but too far beside the annotated person to count as \
+                         found."
+                    ),
+                );
+            }
+            if track.stage == TrackStage::Tentative {
+                return Cause::of_unconfirmed(id, rules);
+            }
+        }
+        let cause = self.dropped_or_measured(number, place, taken, rules);
+        let lead = match (here, former) {
+            (Some(track), _) => format!(
+                "Track {} is only predicted here, and a predicted track does not count as reported",
+                track.id
+            ),
+            (None, Some(Former { id, .. })) => {
+                let tracks = self.tracks(number).iter();
+                let is_elsewhere = tracks.into_iter().any(|track| i64::from(track.id) == id);
+                let course = if is_elsewhere { "was here and is elsewhere now" } else { "ended" };
+                format!("Track {id} {course}, and no new one began")
+            }
+            (None, None) => "No track began here".to_owned(),
+        };
+        let text = format!("{lead}: {}.", cause.why);
+        Cause { text, ..cause }
+    }
+
+    /// Returns the test that dropped the best candidate, else what was measured at the place.
+    fn dropped_or_measured(
+        &self,
+        number: u64,
+        place: &PersonAt,
+        taken: &BTreeSet<i64>,
+        rules: Rules<'_>,
+    ) -> Cause {
+        let Some((test, box_px)) = self.best_dropped(number, place, taken, rules) else {
+            let depths = self.depths(number).zip(place.rect);
+            let measured = depths.and_then(|(depths, rect)| depths.cause(&rect, rules));
+            let (name, why) = measured.unwrap_or_else(|| {
+                ("no candidate", "no detector proposed a candidate here".to_owned())
+            });
+            return Cause { name: name.to_owned(), why, ..Cause::default() };
+        };
+        Cause {
+            test: Some(test.to_owned()),
+            name: test.to_owned(),
+            box_px: Some(box_px),
+            why: rules.remedies.sentence(test, rules.config),
+            ..Cause::default()
+        }
+    }
+
+    /// Returns the candidate that came nearest to a track: one of the person's size before one that
+    /// merely overlaps the person, then by the test that it failed, the last one first, then by the
+    /// distance. Second detections of other people who are found are left out.
+    fn best_dropped(
+        &self,
+        number: u64,
+        place: &PersonAt,
+        taken: &BTreeSet<i64>,
+        rules: Rules<'_>,
+    ) -> Option<(&str, [f64; 4])> {
+        let near = self.dropped(number).filter_map(|(test, dropped)| {
+            let (nearness, distance) = dropped.nearness(place)?;
+            if self.is_of_another(number, dropped, place, taken) {
+                return None;
+            }
+            let is_telling = is_telling(test);
+            let stage = rules.remedies.stage(test, rules.config);
+            Some(((is_telling, nearness, stage), distance, test, dropped.box_px))
+        });
+        let best = near.max_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)))?;
+        Some((best.2, best.3.map(|v| (f64::from(v) * 10.0).round() / 10.0)))
+    }
+}
+
+impl Cause {
+    fn of_place(name: &str, text: String) -> Self {
+        let why = text.trim_end_matches('.').to_owned();
+        Self { name: name.to_owned(), why, text, ..Self::default() }
+    }
+
+    fn of_unconfirmed(id: u32, rules: Rules<'_>) -> Self {
+        let decided = rules.remedies.decided(NOT_CONFIRMED, rules.config);
+        let decided = decided.map_or(String::new(), |decided| format!("; {decided}"));
+        let why = format!("the track manager has not confirmed the track yet{decided}");
+        Self {
+            name: NOT_CONFIRMED.to_owned(),
+            text: format!("Track {id} is here and is not reported: {why}."),
+            why,
+            ..Self::default()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,255 @@
+//! What a run says about each frame: dropped candidates, tracks, and depth.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use tagalong_core::Track;
+use tagalong_geometry::Rect;
+use tagalong_log::LogFrame;
+use tagalong_pipeline::FrameReport;
+
+use super::{Depths, PersonAt};
+use crate::frame_notes::{FateNote, FrameNotes};
+
+/// Largest factor between the widths of a person's box and of a candidate for that person.
+const SIMILAR: f64 = 2.0;
+
+/// Part of the smaller of two boxes that both have in common, from which a candidate is near a person:
+/// one on the chest has little of the box around head and shoulders. Tracks have more in common with
+/// their persons.
+const NEAR_SHARE: f64 = 0.1;
+const NEAR_SHARE_OF_TRACK: f64 = 0.25;
+
+/// Overlap from which a candidate is another detection of a tracked person.
+const SAME_IOU: f64 = 0.5;
+
+/// Distance on the floor up to which a candidate or a track is near a person, m.
+const NEAR_M: f64 = 0.75;
+
+/// State of a track in one frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TrackStage {
+    /// Confirmed, with evidence of this frame: it is reported.
+    Seen,
+    /// Confirmed, without evidence of this frame.
+    Predicted,
+    /// Not confirmed yet.
+    Tentative,
+}
+
+impl TrackStage {
+    /// Returns the state of a track by its two signs.
+    pub fn of(confirmed: bool, seen: bool) -> Self {
+        if !confirmed {
+            Self::Tentative
+        } else if seen {
+            Self::Seen
+        } else {
+            Self::Predicted
+        }
+    }
+}
+
+/// Track in one frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SightedTrack {
+    /// Number of the track.
+    pub id: u32,
+    /// State of the track.
+    pub stage: TrackStage,
+    /// Box of head and shoulders, pixels: left, top, width, height.
+    pub box_px: [f32; 4],
+    /// Place on the floor, odometry frame, m.
+    pub floor_m: [f32; 2],
+}
+
+/// Place at which a candidate was dropped.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct DroppedPlace {
+    /// Position of the test in [`Witness::tests`].
+    test: u16,
+    /// Left, top, width, height; single precision halves the memory of a long log.
+    pub(super) box_px: [f32; 4],
+    /// Place on the floor, odometry frame, m; not finite where it is not known.
+    floor_m: [f32; 2],
+}
+
+/// One frame of a run.
+#[derive(Clone, Debug, Default)]
+struct Sight {
+    places: Vec<DroppedPlace>,
+    tracks: Vec<SightedTrack>,
+    /// Pose of the robot in the odometry frame.
+    robot_odom: [f64; 3],
+    depths: Option<Depths>,
+}
+
+/// What a run says about each frame, by its number.
+#[derive(Clone, Debug, Default)]
+pub struct Witness {
+    tests: Vec<String>,
+    frames: BTreeMap<u64, Sight>,
+}
+
+impl Witness {
+    /// Adds the report of a pipeline on a frame.
+    pub fn take(&mut self, item: &LogFrame, report: &FrameReport) {
+        let frame = &item.frame;
+        let notes = FrameNotes::of(report, &frame.camera, &item.odom_from_robot);
+        let tracks = report.tracks.iter().map(|track| SightedTrack::of(track, item)).collect();
+        let depths = frame.depth().ok().map(|depth| Depths::of(depth, &frame.camera));
+        self.add(report.index, &notes, tracks, depths);
+    }
+
+    /// Adds the notes on a frame.
+    pub fn add(
+        &mut self,
+        number: u64,
+        notes: &FrameNotes,
+        tracks: Vec<SightedTrack>,
+        depths: Option<Depths>,
+    ) {
+        let mut places = Vec::new();
+        for candidate in &notes.candidates {
+            if let FateNote::Dropped(test) = &candidate.fate {
+                let [x, y, _] = candidate.head_odom_m;
+                places.push(self.place(test, candidate.box_px, [x, y]));
+            }
+        }
+        for dropped in &notes.dropped {
+            for box_px in &dropped.boxes_px {
+                places.push(self.place(&dropped.test, *box_px, [f64::NAN; 2]));
+            }
+        }
+        let sight = Sight { places, tracks, robot_odom: notes.robot_odom, depths };
+        self.frames.insert(number, sight);
+    }
+
+    fn place(&mut self, test: &str, box_px: [f64; 4], floor_m: [f64; 2]) -> DroppedPlace {
+        let known = self.tests.iter().position(|name| name == test);
+        let at = known.unwrap_or_else(|| {
+            self.tests.push(test.to_owned());
+            self.tests.len() - 1
+        });
+        let test = u16::try_from(at).unwrap_or(u16::MAX);
+        DroppedPlace { test, box_px: box_px.map(|v| v as f32), floor_m: floor_m.map(|v| v as f32) }
+    }
+
+    /// Returns a place of the robot frame in the odometry frame, as of a frame.
+    pub(super) fn in_odom(&self, number: u64, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+        let [robot_x, robot_y, heading] = self.frames.get(&number)?.robot_odom;
+        let (sin, cos) = heading.sin_cos();
+        Some([robot_x + cos * x - sin * y, robot_y + sin * x + cos * y])
+    }
+
+    /// Returns the tracks of a frame.
+    pub(super) fn tracks(&self, number: u64) -> &[SightedTrack] {
+        self.frames.get(&number).map_or(&[], |sight| &sight.tracks)
+    }
+
+    /// Returns the depth image of a frame, reduced.
+    pub(super) fn depths(&self, number: u64) -> Option<&Depths> {
+        self.frames.get(&number)?.depths.as_ref()
+    }
+
+    /// Returns the dropped candidates of a frame with their tests.
+    pub(super) fn dropped(&self, number: u64) -> impl Iterator<Item = (&str, &DroppedPlace)> {
+        let places = self.frames.get(&number).map_or(&[][..], |sight| &sight.places);
+        places
+            .iter()
+            .filter_map(|place| Some((self.tests.get(usize::from(place.test))?.as_str(), place)))
+    }
+
+    /// Returns true for a candidate at a track of another person that is nearer to that track.
+    pub(super) fn is_of_another(
+        &self,
+        number: u64,
+        dropped: &DroppedPlace,
+        person: &PersonAt,
+        taken: &BTreeSet<i64>,
+    ) -> bool {
+        let Some(rect) = person.rect else { return false };
+        let own = rect_of(&dropped.box_px);
+        let others = self.tracks(number).iter();
+        let mut others = others.filter(|track| taken.contains(&i64::from(track.id)));
+        others.any(|track| {
+            let overlap = rect_of(&track.box_px).iou(&own);
+            overlap >= SAME_IOU && overlap > rect.iou(&own)
+        })
+    }
+
+    /// Returns the track at a place that is on no other person: a confirmed one first, then the
+    /// nearest.
+    pub(super) fn track_at(
+        &self,
+        number: u64,
+        person: &PersonAt,
+        taken: &BTreeSet<i64>,
+    ) -> Option<SightedTrack> {
+        let free = self.tracks(number).iter().filter(|track| !taken.contains(&i64::from(track.id)));
+        let near = free.filter_map(|track| {
+            let (_, distance) =
+                nearness(&track.box_px, &track.floor_m, person, NEAR_SHARE_OF_TRACK)?;
+            Some((track.stage == TrackStage::Tentative, distance, *track))
+        });
+        let best = near.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        best.map(|(.., track)| track)
+    }
+}
+
+impl SightedTrack {
+    fn of(track: &Track, item: &LogFrame) -> Self {
+        let region = track.estimate.region;
+        let floor = item.odom_from_robot * track.estimate.person.position.xy();
+        Self {
+            id: track.id.0,
+            stage: TrackStage::of(track.confirmed, track.seen),
+            box_px: [region.x, region.y, region.width, region.height].map(|v| v as f32),
+            floor_m: [floor.x as f32, floor.y as f32],
+        }
+    }
+}
+
+/// Nearness of a box to a person; of two the larger one is nearer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Nearness {
+    /// Their boxes overlap.
+    Overlaps,
+    /// Its centre is inside of the person's box, and it is of the person's size.
+    Fits,
+}
+
+impl DroppedPlace {
+    /// Returns the nearness to a person, and the distance; `None` for a place of another thing.
+    pub(super) fn nearness(&self, person: &PersonAt) -> Option<(Nearness, f64)> {
+        nearness(&self.box_px, &self.floor_m, person, NEAR_SHARE)
+    }
+}
+
+fn rect_of(box_px: &[f32; 4]) -> Rect {
+    let [x, y, width, height] = box_px.map(f64::from);
+    Rect::new(x, y, width, height)
+}
+
+/// Compares boxes where the person has one, else places on the floor. Boxes that fit need no share in
+/// common.
+fn nearness(
+    box_px: &[f32; 4],
+    floor_m: &[f32; 2],
+    person: &PersonAt,
+    least_share: f64,
+) -> Option<(Nearness, f64)> {
+    let Some(rect) = person.rect else {
+        let at = person.floor_m?;
+        let distance = (f64::from(floor_m[0]) - at[0]).hypot(f64::from(floor_m[1]) - at[1]);
+        return (distance <= NEAR_M).then_some((Nearness::Fits, distance));
+    };
+    let other = rect_of(box_px);
+    let distance = (other.centre() - rect.centre()).norm();
+    let is_similar = (1.0 / SIMILAR..=SIMILAR).contains(&(other.width / rect.width.max(1.0)));
+    if is_similar && rect.contains(other.centre()) {
+        return Some((Nearness::Fits, distance));
+    }
+    let smaller = rect.area().min(other.area());
+    let is_near = smaller > 0.0 && rect.intersection(&other).area() >= least_share * smaller;
+    is_near.then_some((Nearness::Overlaps, distance))
+}
