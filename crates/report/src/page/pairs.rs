@@ -26,13 +26,22 @@ struct ErrorKind {
     words: [&'static str; 2],
 }
 
-/// Errors beside misses, which are named by their tests.
-const ERROR_KINDS: [ErrorKind; 2] = [
+/// False reports. Misses are named by their tests.
+const FALSE_REPORTS: ErrorKind = ErrorKind {
+    figure: "image.fp_per_frame",
+    least: 0.02,
+    decimals: 2,
+    words: ["reports", "false people per frame"],
+};
+
+/// Errors of identity, of which the first one that differs is named: a track that goes over to another
+/// person costs more than a new number for the same one.
+const IDENTITY_ERRORS: [ErrorKind; 2] = [
     ErrorKind {
-        figure: "image.fp_per_frame",
-        least: 0.02,
-        decimals: 2,
-        words: ["reports", "false people per frame"],
+        figure: "image.wrong_person_s",
+        least: 0.5,
+        decimals: 1,
+        words: ["is on the wrong person for", "s per log"],
     },
     ErrorKind {
         figure: "image.IDSW",
@@ -100,10 +109,11 @@ impl Page<'_> {
             };
             line += &format!("; {why}");
         }
-        for kind in &ERROR_KINDS {
-            if let Some(difference) = self.errors_of_pair(kind, better.2, worse.2) {
-                line += &format!("; {difference}");
-            }
+        let false_reports = self.errors_of_pair(&FALSE_REPORTS, better.2, worse.2);
+        let mut of_identity = IDENTITY_ERRORS.iter();
+        let identity = of_identity.find_map(|kind| self.errors_of_pair(kind, better.2, worse.2));
+        for difference in false_reports.iter().chain(&identity) {
+            line += &format!("; {difference}");
         }
         Some(line)
     }
