@@ -68,6 +68,9 @@ impl Traits {
     }
 }
 
+/// Logs, or scenes, each with the reasons for which a config does not suit it; none where it does.
+pub type LogMisfits = Vec<(String, Vec<String>)>;
+
 /// Command that leads to better configs for a log.
 pub const COMPARE: &str = "`tagalong doctor LOG` compares the configs that fit";
 
@@ -86,10 +89,9 @@ pub fn misfit_note(config: &str, unsuited: &[(String, Vec<String>)]) -> Option<S
     ))
 }
 
-/// Returns one note for all configs, each with what [`misfit_note`] takes: the reasons of a single config
-/// that does not suit some logs, and of several their names with the numbers of logs; `None` if each suits
-/// all logs.
-pub fn misfits_note(configs: &[(String, Vec<(String, Vec<String>)>)]) -> Option<String> {
+/// Returns one note for all configs: that of [`misfit_note`] where a single one does not suit some logs,
+/// and the names of several with their numbers of logs; `None` if each suits all.
+pub fn misfits_note(configs: &[(String, LogMisfits)]) -> Option<String> {
     let mut unsuited = Vec::new();
     for (config, logs) in configs {
         let count = logs.iter().filter(|(_, misfits)| !misfits.is_empty()).count();
@@ -166,7 +168,7 @@ mod tests {
 
     #[test]
     fn several_configs_have_one_note_without_reasons() {
-        fn config(name: &str, misfits: [&[&str]; 2]) -> (String, Vec<(String, Vec<String>)>) {
+        fn config(name: &str, misfits: [&[&str]; 2]) -> (String, LogMisfits) {
             let logs = ["a", "b"].iter().zip(misfits);
             let logs = logs.map(|(log, misfits)| {
                 ((*log).to_owned(), misfits.iter().map(|it| (*it).to_owned()).collect())

@@ -303,6 +303,21 @@ fn a_log_that_lacks_depth_is_skipped_with_the_reason() {
 }
 
 #[test]
+fn a_log_of_scans_alone_is_not_sent_to_annotate() {
+    let Some(scans) = tagalong_conformance::testdata::find("laser/laser-moving.mcap") else {
+        return;
+    };
+    let home = Home::new();
+    fs::copy(scans, home.path("logs/scans.mcap")).unwrap();
+    for arguments in [["--logs-dir", "logs"], ["--logs", "logs/scans.mcap"]] {
+        let output = home.bench(&[&["plan", "-o", "out"][..], &arguments].concat());
+        let said = text(&output.stderr);
+        assert!(said.contains("scans.mcap has no truth"), "{said}");
+        assert!(said.contains("NAME.people-floor.csv") && !said.contains("annotate"), "{said}");
+    }
+}
+
+#[test]
 fn a_pipeline_that_can_detect_nothing_is_skipped_with_the_reason_that_run_gives() {
     let home = Home::new();
     for config in ["omni-rich", "onnx"] {

@@ -24,30 +24,33 @@ struct ErrorKind {
     decimals: usize,
     /// Words for the pipeline that has more of it, before and after the number.
     words: [&'static str; 2],
+    /// True for errors of identity, of which the first one is named: a track that goes over to another
+    /// person costs more than a new ID for the same one.
+    is_of_identity: bool,
 }
 
-/// False reports. Misses are named by their tests.
-const FALSE_REPORTS: ErrorKind = ErrorKind {
-    figure: "image.fp_per_frame",
-    least: 0.02,
-    decimals: 2,
-    words: ["reports", "false people per frame"],
-};
-
-/// Errors of identity, of which the first one that differs is named: a track that goes over to another
-/// person costs more than a new number for the same one.
-const IDENTITY_ERRORS: [ErrorKind; 2] = [
+/// Errors beside misses, which are named by their tests.
+const ERROR_KINDS: [ErrorKind; 3] = [
+    ErrorKind {
+        figure: "image.fp_per_frame",
+        least: 0.02,
+        decimals: 2,
+        words: ["reports", "false people per frame"],
+        is_of_identity: false,
+    },
     ErrorKind {
         figure: "image.wrong_person_s",
         least: 0.5,
         decimals: 1,
-        words: ["is on the wrong person for", "s per log"],
+        words: ["follows the wrong person for", "s per log"],
+        is_of_identity: true,
     },
     ErrorKind {
         figure: "image.IDSW",
         least: 0.5,
         decimals: 1,
         words: ["switches IDs", "times per log"],
+        is_of_identity: true,
     },
 ];
 
@@ -109,11 +112,15 @@ impl Page<'_> {
             };
             line += &format!("; {why}");
         }
-        let false_reports = self.errors_of_pair(&FALSE_REPORTS, better.2, worse.2);
-        let mut of_identity = IDENTITY_ERRORS.iter();
-        let identity = of_identity.find_map(|kind| self.errors_of_pair(kind, better.2, worse.2));
-        for difference in false_reports.iter().chain(&identity) {
-            line += &format!("; {difference}");
+        let mut has_identity = false;
+        for kind in &ERROR_KINDS {
+            if kind.is_of_identity && has_identity {
+                continue;
+            }
+            if let Some(difference) = self.errors_of_pair(kind, better.2, worse.2) {
+                line += &format!("; {difference}");
+                has_identity |= kind.is_of_identity;
+            }
         }
         Some(line)
     }
