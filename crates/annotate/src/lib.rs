@@ -39,6 +39,7 @@ use tagalong_app::config_file::ConfigFile;
 use tagalong_app::input_args::InputArgs;
 use tagalong_app::outcome::{Ended, Failure, Outcome, make_room_for, print, say};
 use tagalong_app::progress::Progress;
+use tagalong_app::scoring::annotated_file;
 use tagalong_app::signals::Signals;
 use tagalong_app::suggest::check_log_path;
 use tagalong_config::Registry;
@@ -100,7 +101,7 @@ Examples:
 pub fn annotate(args: &AnnotateArgs, registry: &Registry) -> Outcome {
     let signals = Signals::listen()?;
     check_log_path(&args.log)?;
-    let output = args.output.clone().unwrap_or_else(|| default_output(&args.log));
+    let output = args.output.clone().unwrap_or_else(|| annotated_file(&args.log));
     check_writable(&output)?;
     let access = Access::loopback(args.port).with_changes(Changes::FromPage);
     let server = Server::open(access).map_err(|error| {
@@ -164,11 +165,6 @@ fn app(
         origin,
         finished: AtomicBool::new(false),
     })
-}
-
-/// Returns the file beside the log in which `eval` and `bench` look for truth.
-fn default_output(log: &Path) -> PathBuf {
-    log.with_extension("people.csv")
 }
 
 /// Refuses a file that could not be written, before an hour of work is put into it.
@@ -345,6 +341,6 @@ mod tests {
 
     #[test]
     fn the_file_is_beside_the_log() {
-        assert_eq!(default_output(Path::new("a/walk.mcap")), Path::new("a/walk.people.csv"));
+        assert_eq!(annotated_file(Path::new("a/walk.mcap")), Path::new("a/walk.people.csv"));
     }
 }

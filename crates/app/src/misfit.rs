@@ -68,6 +68,9 @@ impl Traits {
     }
 }
 
+/// Logs, or scenes, each with the reasons for which a config does not suit it; none where it does.
+pub type LogMisfits = Vec<(String, Vec<String>)>;
+
 /// Command that leads to better configs for a log.
 pub const COMPARE: &str = "`tagalong doctor LOG` compares the configs that fit";
 
@@ -84,6 +87,34 @@ pub fn misfit_note(config: &str, unsuited: &[(String, Vec<String>)]) -> Option<S
         "{config} is by its [suits] not made for {}: expect worse tracks",
         each.join(", ")
     ))
+}
+
+/// Returns one note for all configs: that of [`misfit_note`] where a single one does not suit some logs,
+/// and the names of several with their numbers of logs; `None` if each suits all.
+pub fn misfits_note(configs: &[(String, LogMisfits)]) -> Option<String> {
+    let mut unsuited = Vec::new();
+    for (config, logs) in configs {
+        let count = logs.iter().filter(|(_, misfits)| !misfits.is_empty()).count();
+        if count > 0 {
+            unsuited.push((config, logs, count));
+        }
+    }
+    if let [(config, logs, _)] = unsuited[..] {
+        return misfit_note(config, logs);
+    }
+    let each: Vec<String> = unsuited
+        .iter()
+        .map(|(config, _, count)| {
+            format!("{config} ({count} {})", if *count == 1 { "log" } else { "logs" })
+        })
+        .collect();
+    (!each.is_empty()).then(|| {
+        format!(
+            "{} configs are by their [suits] not made for some of the logs, where tracks are worse: {}",
+            each.len(),
+            each.join(", ")
+        )
+    })
 }
 
 #[cfg(test)]
@@ -133,5 +164,25 @@ mod tests {
             "{note}"
         );
         assert_eq!(misfit_note("low", &[log("b", &[])]), None);
+    }
+
+    #[test]
+    fn several_configs_have_one_note_without_reasons() {
+        fn config(name: &str, misfits: [&[&str]; 2]) -> (String, LogMisfits) {
+            let logs = ["a", "b"].iter().zip(misfits);
+            let logs = logs.map(|(log, misfits)| {
+                ((*log).to_owned(), misfits.iter().map(|it| (*it).to_owned()).collect())
+            });
+            (name.to_owned(), logs.collect())
+        }
+
+        let one = config("low", [&["too high"], &[]]);
+        let two = config("wide", [&["too high"], &["x", "y"]]);
+        let fits = config("all", [&[], &[]]);
+        let note = misfits_note(&[one.clone(), fits.clone(), two]).expect("a note");
+        assert!(note.starts_with("2 configs are by their [suits] not made for some"), "{note}");
+        assert!(note.ends_with(": low (1 log), wide (2 logs)"), "{note}");
+        assert_eq!(misfits_note(&[one.clone(), fits.clone()]), misfit_note("low", &one.1));
+        assert_eq!(misfits_note(&[fits]), None);
     }
 }

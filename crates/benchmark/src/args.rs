@@ -74,8 +74,8 @@ pub struct PlanArgs {
     /// The pipelines [default: every config in configs that suits a log, or every built-in one].
     #[arg(long, num_args = 1.., value_name = "CONFIG")]
     pub configs: Vec<PathBuf>,
-    /// The logs; the truth of NAME.mcap is NAME.people.csv, NAME.truth.jsonl, NAME.boxes.csv, or in
-    /// it.
+    /// The logs; the truth of NAME.mcap is NAME.people.csv, NAME.truth.jsonl, NAME.boxes.csv,
+    /// NAME.people-floor.csv, or in it.
     #[arg(long, num_args = 1.., value_name = "LOG")]
     pub logs: Vec<PathBuf>,
     /// Every log with truth in this folder.

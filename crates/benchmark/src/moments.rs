@@ -23,7 +23,7 @@ struct Witness<'a> {
 /// Returns moments of all logs in turn, first those in which most pipelines miss somebody.
 pub fn gather(stored: &[Stored]) -> Vec<Moment> {
     let mut by_log: BTreeMap<&str, Vec<Witness<'_>>> = BTreeMap::new();
-    for Stored { result, recording, images } in stored {
+    for Stored { result, recording, images, .. } in stored {
         let Some(recording) = recording else { continue };
         by_log.entry(&result.log).or_default().push(Witness { result, recording, images });
     }
@@ -118,6 +118,7 @@ mod tests {
                 ..Recording::default()
             }),
             images: images.iter().map(|frame| (*frame, format!("image {frame}"))).collect(),
+            ..Stored::default()
         }
     }
 

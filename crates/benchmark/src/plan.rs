@@ -8,12 +8,15 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use tagalong_app::config_file::{ConfigFile, OuterSettings};
-use tagalong_app::misfit::{COMPARE, Traits, misfit_note};
+use tagalong_app::misfit::{COMPARE, Traits, misfits_note};
 use tagalong_app::outcome::{Failure, say};
-use tagalong_app::scoring::TruthFile;
+use tagalong_app::scoring::{TruthFile, files_of};
 use tagalong_app::suggest::{self, check_log_path, toml_files};
 use tagalong_config::{Registry, path_text};
-use tagalong_log::{COPY_OF, FrameSource, Inputs, Limits, LogError, read_attachment};
+use tagalong_log::{
+    COPY_OF, FrameSource, InputSettings, Inputs, Limits, LogError, read_attachment,
+};
+use tagalong_math::counted;
 use tagalong_pipeline::{Suits, Tunable};
 
 use super::args::PlanArgs;
@@ -150,12 +153,21 @@ pub fn plan(args: &PlanArgs, registry: &Registry) -> Result<Vec<Task>, Failure> 
             }
         }
     }
-    for (config, unsuited) in configs.iter().zip(&unsuited) {
-        if let Some(note) = misfit_note(&config.file.stem(), unsuited) {
-            say(&format!("note: {note}; {COMPARE}"));
-        }
+    let names = configs.iter().map(|config| config.file.stem());
+    let unsuited: Vec<_> = names.zip(unsuited).collect();
+    if let Some(note) = misfits_note(&unsuited) {
+        say(&format!("note: {note}; {COMPARE}"));
     }
+    say(&size(args, configs.len(), logs.len(), tasks.len()));
     Ok(tasks)
+}
+
+/// Returns the number of tasks in words, with the option that limits them where none was given.
+fn size(args: &PlanArgs, configs: usize, logs: usize, tasks: usize) -> String {
+    let [configs, logs] = [counted(configs, "config"), counted(logs, "log")];
+    let seeds = if args.seeds > 1 { format!(", {} seeds", args.seeds) } else { String::new() };
+    let limit = if args.configs.is_empty() { "; --configs limits them" } else { "" };
+    format!("{} planned: {configs} on {logs}{seeds}{limit}", counted(tasks, "task"))
 }
 
 /// Reads the config of a task again.
@@ -330,19 +342,17 @@ fn logs(args: &PlanArgs) -> Result<Vec<Annotated>, Failure> {
         match annotated(&log)? {
             Some(annotated) => found.push(annotated),
             None => {
-                let shown = log.display();
                 say(&format!(
-                    "note: left out: {shown} has no truth; `tagalong annotate {shown}` makes one"
+                    "note: left out: {} has no truth; {}",
+                    log.display(),
+                    makes_truth(&log)
                 ));
             }
         }
     }
     found.iter_mut().for_each(|log| log.drops_doubled_ids = args.drop_doubled_ids);
     if found.is_empty() {
-        return Err(Failure::usage(
-            "no log with truth; name some with --logs or --logs-dir, and make truth with `tagalong \
-             annotate LOG`",
-        ));
+        return Err(Failure::usage("no log with truth; name some with --logs or --logs-dir"));
     }
     Ok(found)
 }
@@ -364,15 +374,27 @@ fn mcap_files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
 /// A log without truth, or one that cannot be read.
 pub fn with_truth(log: &Path) -> Result<Annotated, Failure> {
     annotated(log)?.ok_or_else(|| {
-        let stem = log.with_extension("");
-        let stem = stem.display();
-        let shown = log.display();
         Failure::usage(format!(
-            "{shown} has no truth: neither {stem}.people.csv nor {stem}.truth.jsonl nor \
-             {stem}.boxes.csv nor a channel {} in it; `tagalong annotate {shown}` makes one",
-            tagalong_log::TRUTH_TOPIC
+            "{} has no truth: none of {} beside it, and no channel {} in it; {}",
+            log.display(),
+            files_of(log),
+            tagalong_log::TRUTH_TOPIC,
+            makes_truth(log)
         ))
     })
+}
+
+/// Returns the way to truth for a log that has none. Nobody can be annotated in scans alone.
+fn makes_truth(log: &Path) -> String {
+    let settings = InputSettings::default();
+    let opened = FrameSource::open(log, &settings, &Limits::default(), Inputs::ANY);
+    let is_blind = opened.is_ok_and(|source| source.facts().width == 0);
+    if is_blind {
+        return "without images people cannot be annotated: give their places as \
+                NAME.people-floor.csv beside it"
+            .into();
+    }
+    format!("`tagalong annotate {}` makes one", log.display())
 }
 
 /// Returns the log with its truth, if it has any.
@@ -450,5 +472,20 @@ mod tests {
         std::fs::write(&log, "").unwrap();
         let why = mcap_files(&log).unwrap_err().message;
         assert!(why.contains(&format!("`--logs {}`", log.display())), "{why}");
+    }
+
+    #[test]
+    fn the_size_of_a_plan_names_the_option_that_limits_it() {
+        let mut args = PlanArgs {
+            configs: Vec::new(),
+            logs: Vec::new(),
+            logs_dir: None,
+            seeds: 1,
+            drop_doubled_ids: false,
+        };
+        let all = size(&args, 38, 8, 304);
+        assert_eq!(all, "304 tasks planned: 38 configs on 8 logs; --configs limits them");
+        (args.configs, args.seeds) = (vec!["a.toml".into()], 3);
+        assert_eq!(size(&args, 1, 2, 6), "6 tasks planned: 1 config on 2 logs, 3 seeds");
     }
 }

@@ -2,8 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
+use std::path::Path;
 
 use tagalong_app::outcome::Failure;
+use tagalong_app::scoring::match_note;
 use tagalong_math::counted;
 use tagalong_report::{Benchmark, Outcome, TaskResult, Timings};
 
@@ -29,8 +31,9 @@ pub fn gather(store: &Store) -> Result<Benchmark, Failure> {
     }
     if missing.is_empty() {
         let moments = moments::gather(&all);
+        let notes = notes(&plan, &all);
         let tasks = all.into_iter().map(|stored| stored.result).collect();
-        return Ok(Benchmark { version, tasks, copies: copies(&plan), moments });
+        return Ok(Benchmark { version, tasks, copies: copies(&plan), notes, moments });
     }
     let count = missing.len();
     let first = &missing[0];
@@ -40,6 +43,36 @@ pub fn gather(store: &Store) -> Result<Benchmark, Failure> {
         plan.len(),
         store.path("").display()
     )))
+}
+
+/// People, matches and reports of all pipelines on one log.
+#[derive(Default)]
+struct Matched {
+    people: u64,
+    matches: u64,
+    reports: u64,
+}
+
+/// Returns the notes on the truth of each log, once each.
+fn notes(plan: &[Task], all: &[Stored]) -> Vec<String> {
+    let mut notes: Vec<String> = Vec::new();
+    let mut logs: BTreeMap<&Path, Matched> = BTreeMap::new();
+    for (task, stored) in plan.iter().zip(all) {
+        for note in &stored.notes {
+            if !notes.contains(note) {
+                notes.push(note.clone());
+            }
+        }
+        let Some(scores) = stored.result.image.or(stored.result.metres) else { continue };
+        let log = logs.entry(&task.truth).or_default();
+        log.people += scores.truths;
+        log.matches += scores.tp;
+        log.reports += scores.reports;
+    }
+    for (truth, log) in logs {
+        notes.extend(match_note(truth, log.people, log.matches, log.reports));
+    }
+    notes
 }
 
 /// Returns the names of logs that go back to one recording.
@@ -96,24 +129,10 @@ const MOST_REASONS: usize = 6;
 
 /// Returns the main figures, for a terminal.
 pub fn text(store: &Store, benchmark: &Benchmark) -> String {
-    let first = benchmark.tasks.iter().map(|task| task.pipeline.len()).fold(8, usize::max);
-    let second = benchmark.tasks.iter().map(|task| task.log.len()).fold(8, usize::max);
-    let mut out = format!(
-        "{:<first$}  {:<second$}  {:>6}  {:>6}  {:>6}  {:>6}  {:>5}  {:>10}\n",
-        "pipeline", "log", "seed", "HOTA", "MOTA", "IDF1", "IDSW", "error m"
-    );
+    let mut out = tables(&benchmark.tasks);
     let skipped: Vec<&TaskResult> =
         benchmark.tasks.iter().filter(|task| is_skipped(task)).collect();
-    let is_brief = skipped.len() > MOST_REASONS;
-    for task in benchmark.tasks.iter().filter(|task| !is_brief || !is_skipped(task)) {
-        let _ = write!(out, "{:<first$}  {:<second$}  {:>6}  ", task.pipeline, task.log, task.seed);
-        let _ = match &task.outcome {
-            Outcome::Done => writeln!(out, "{}", figures(task)),
-            Outcome::Failed { why } => writeln!(out, "failed: {}", first_line(why)),
-            Outcome::Skipped { why } => writeln!(out, "skipped: {}", first_line(why)),
-        };
-    }
-    if is_brief {
+    if skipped.len() > MOST_REASONS {
         let pipelines: BTreeSet<&str> = skipped.iter().map(|task| task.pipeline.as_str()).collect();
         let names: Vec<&str> = pipelines.into_iter().collect();
         let _ = writeln!(
@@ -133,10 +152,51 @@ pub fn text(store: &Store, benchmark: &Benchmark) -> String {
             );
         }
     }
+    for note in &benchmark.notes {
+        let _ = writeln!(out, "note: {note}");
+    }
     for logs in &benchmark.copies {
         let _ = writeln!(out, "note: {}", tagalong_report::copies_note(logs));
     }
     let _ = writeln!(out, "report in {}", store.path("report.html").display());
+    out
+}
+
+/// Returns the table of the figures in the image, and that of the logs whose truth has places alone.
+fn tables(tasks: &[TaskResult]) -> String {
+    let is_brief = tasks.iter().filter(|task| is_skipped(task)).count() > MOST_REASONS;
+    let shown = tasks.iter().filter(|task| !is_brief || !is_skipped(task));
+    let (floor, image): (Vec<&TaskResult>, Vec<&TaskResult>) =
+        shown.partition(|task| task.image.is_none() && task.metres.is_some());
+    let mut out = String::new();
+    for (title, tasks) in [
+        ("in the image; `error m` on the floor:", image),
+        ("on the floor, as the truth has no boxes:", floor),
+    ] {
+        if !tasks.is_empty() {
+            let _ = writeln!(out, "{title}");
+            out += &table(&tasks);
+        }
+    }
+    out
+}
+
+/// Returns the table of some tasks.
+fn table(tasks: &[&TaskResult]) -> String {
+    let first = tasks.iter().map(|task| task.pipeline.len()).fold(8, usize::max);
+    let second = tasks.iter().map(|task| task.log.len()).fold(8, usize::max);
+    let mut out = format!(
+        "{:<first$}  {:<second$}  {:>6}  {:>6}  {:>6}  {:>6}  {:>5}  {:>14}  {:>10}\n",
+        "pipeline", "log", "seed", "HOTA", "MOTA", "IDF1", "IDSW", "wrong person s", "error m"
+    );
+    for task in tasks {
+        let _ = write!(out, "{:<first$}  {:<second$}  {:>6}  ", task.pipeline, task.log, task.seed);
+        let _ = match &task.outcome {
+            Outcome::Done => writeln!(out, "{}", figures(task)),
+            Outcome::Failed { why } => writeln!(out, "failed: {}", first_line(why)),
+            Outcome::Skipped { why } => writeln!(out, "skipped: {}", first_line(why)),
+        };
+    }
     out
 }
 
@@ -153,5 +213,71 @@ fn figures(task: &TaskResult) -> String {
     let [hota, mota, idf1, error_m] =
         [scores.hota, scores.mota, scores.idf1, scores.position_error_mean_m]
             .map(|value| value.map_or("-".to_owned(), |value| format!("{value:.3}")));
-    format!("{hota:>6}  {mota:>6}  {idf1:>6}  {:>5}  {error_m:>10}", scores.idsw)
+    format!(
+        "{hota:>6}  {mota:>6}  {idf1:>6}  {:>5}  {:>14.2}  {error_m:>10}",
+        scores.idsw, scores.wrong_person_s
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use tagalong_eval::Scores;
+
+    use super::*;
+
+    fn task(pipeline: &str, log: &str) -> TaskResult {
+        TaskResult { pipeline: pipeline.into(), log: log.into(), ..TaskResult::default() }
+    }
+
+    #[test]
+    fn figures_in_the_image_and_on_the_floor_are_told_apart() {
+        let scores =
+            Scores { hota: Some(0.5), idsw: 1, wrong_person_s: 5.125, ..Scores::default() };
+        let image = TaskResult { image: Some(scores), metres: Some(scores), ..task("a", "hall") };
+        let floor = TaskResult { metres: Some(scores), ..task("a", "laser") };
+        let text = tables(&[floor, image.clone()]);
+        let lines: Vec<&str> = text.lines().collect();
+        let [image_title, head, hall, floor_title, _, laser] = lines[..] else { panic!("{text}") };
+        assert!(image_title.starts_with("in the image") && hall.contains("hall"), "{text}");
+        assert!(floor_title.starts_with("on the floor") && laser.contains("laser"), "{text}");
+        assert!(head.contains("wrong person s"), "{head}");
+        let cells: Vec<&str> = hall.split_whitespace().collect();
+        assert_eq!(cells, ["a", "hall", "0", "0.500", "-", "-", "1", "5.12", "-"]);
+        assert!(!tables(&[image]).contains("on the floor, as"));
+    }
+
+    #[test]
+    fn nothing_that_matches_on_a_log_is_asked_about_once_for_all_pipelines() {
+        let plan: Vec<Task> = ["a", "b"].iter().map(|name| planned(name)).collect();
+        let asked = "hall.people.csv: nothing matches: is it the truth of another log?";
+        assert_eq!(notes(&plan, &[0, 0].map(stored)), ["hall.people.csv: odd", asked]);
+        // A pipeline may be bad, where another one finds the people.
+        assert_eq!(notes(&plan, &[0, 28].map(stored)), ["hall.people.csv: odd"]);
+    }
+
+    /// Returns the result of a task in which so many people match.
+    fn stored(tp: u64) -> Stored {
+        let scores = Scores { truths: 30, reports: 20, tp, ..Scores::default() };
+        let result = TaskResult { image: Some(scores), ..task("a", "hall") };
+        Stored { result, notes: vec!["hall.people.csv: odd".into()], ..Stored::default() }
+    }
+
+    fn planned(pipeline: &str) -> Task {
+        Task {
+            k: 1,
+            hash: pipeline.into(),
+            pipeline: pipeline.into(),
+            config: "a.toml".into(),
+            log_name: "hall".into(),
+            log: "logs/hall.mcap".into(),
+            truth: "logs/hall.people.csv".into(),
+            whole_bodies: false,
+            drops_doubled_ids: false,
+            seed: 0,
+            inputs: BTreeMap::new(),
+            copy_of: None,
+            version: String::new(),
+            skip: None,
+        }
+    }
 }

@@ -29,6 +29,9 @@ pub struct Stored {
     /// Images of moments in which people are missed, by frame: JPEG in base64.
     #[serde(default)]
     pub images: BTreeMap<u64, String>,
+    /// Notes on the truth beside the log.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
 }
 
 /// Scored sequence, with the facts that the formats need beside it.

@@ -10,7 +10,7 @@ use tagalong_app::missed::Rules;
 use tagalong_app::outcome::{Failure, say};
 use tagalong_app::progress::Forecast;
 use tagalong_app::remedies::Remedies;
-use tagalong_app::scoring::{Shot, Shots, TruthFile, TruthOptions};
+use tagalong_app::scoring::{Shot, Shots, TruthFile, TruthOptions, truth_notes};
 use tagalong_app::signals::Signals;
 use tagalong_app::unable::unable;
 use tagalong_config::Registry;
@@ -264,7 +264,6 @@ impl Desk<'_> {
             ..TruthOptions::default()
         };
         let truth = TruthFile::read(&first.truth, options).map_err(|failure| failure.message)?;
-        truth.notes.iter().for_each(|note| say(&format!("note: {note}")));
         let mut source = open(&group[0], group[0].config.inputs)?;
         let lanes = group.iter().map(|ready| {
             Lane::new(|| {
@@ -282,17 +281,28 @@ impl Desk<'_> {
             lanes.iter_mut().for_each(|lane| lane.step(&item));
         }
         let lost = source.data_lost();
+        let notes = notes_on(first, &truth, &shots);
         let remedies = Remedies::new(self.registry);
         let mut stored = Vec::new();
         let mut timings = Vec::new();
         for (ready, lane) in group.iter().zip(lanes) {
             let (result, timing) = lane.finish(&ready.task, &truth, &shots, lost, &remedies);
-            stored.push(result);
+            stored.push(Stored { notes: notes.clone(), ..result });
             timings.push(timing);
         }
         illustrate(&group[0], &mut stored)?;
         Ok(Some(stored.into_iter().zip(timings).collect()))
     }
+}
+
+/// Returns the notes on the truth of a log, without its folder: results are the same everywhere.
+fn notes_on(task: &Task, truth: &TruthFile, shots: &Shots) -> Vec<String> {
+    let path = task.truth.display().to_string();
+    let name = task.truth.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let log = task.log.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let mut notes = truth_notes(&task.truth, truth, Some(&log), shots);
+    notes.extend(truth.notes.iter().map(|note| note.replace(&path, &name)));
+    notes
 }
 
 /// Result, and the times if the task succeeded.

@@ -29,8 +29,13 @@ pub fn json(benchmark: &Benchmark) -> serde_json::Result<String> {
     } else {
         format!("\"copies\":{},\n", serde_json::to_string(view.copies)?)
     };
+    let notes = if view.notes.is_empty() {
+        String::new()
+    } else {
+        format!("\"notes\":{},\n", serde_json::to_string(view.notes)?)
+    };
     Ok(format!(
-        "{{\"version\":{version},\n{copies}\"summary\":{summary},\n\"tasks\":[\n{tasks}\n]}}\n"
+        "{{\"version\":{version},\n{copies}{notes}\"summary\":{summary},\n\"tasks\":[\n{tasks}\n]}}\n"
     ))
 }
 

@@ -17,6 +17,9 @@ pub struct Benchmark {
     /// intervals count each of them as a log of its own.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub copies: Vec<Vec<String>>,
+    /// Notes on the logs and their truth, as signs that a truth is that of another log.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
     /// Moments in which people were missed, with their images; for the page alone.
     #[serde(skip)]
     pub moments: Vec<Moment>,

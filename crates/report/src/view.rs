@@ -14,6 +14,8 @@ pub struct OrderedBenchmark<'a> {
     pub logs: Vec<&'a str>,
     /// Logs that go back to one recording.
     pub copies: &'a [Vec<String>],
+    /// Notes on the logs and their truth.
+    pub notes: &'a [String],
 }
 
 impl<'a> OrderedBenchmark<'a> {
@@ -29,6 +31,7 @@ impl<'a> OrderedBenchmark<'a> {
             pipelines: pipelines.into_iter().collect(),
             logs: logs.into_iter().collect(),
             copies: &benchmark.copies,
+            notes: &benchmark.notes,
         }
     }
 

@@ -492,6 +492,36 @@ fn a_pair_that_finds_the_same_people_differs_in_its_false_reports() {
 }
 
 #[test]
+fn the_time_on_the_wrong_person_is_named_before_id_switches() {
+    let mut benchmark = two_by_three();
+    let odd = benchmark.tasks[0].pipeline.clone();
+    for (wrong_s, named, silent) in [
+        (5.0, " follows the wrong person for 5.0 s per log, ", " switches IDs "),
+        (0.25, " switches IDs 9.0 times per log, ", " follows the wrong person "),
+    ] {
+        for task in &mut benchmark.tasks {
+            let is_odd = task.pipeline == odd;
+            let scores = task.image.as_mut().expect("figures in the image");
+            scores.wrong_person_s = if is_odd { wrong_s } else { 0.0 };
+            scores.idsw = if is_odd { 9 } else { 0 };
+        }
+        let page = html(&benchmark, None);
+        assert!(page.contains(&format!("; {odd}{named}")), "{named}");
+        assert!(!page.contains(&format!("; {odd}{silent}")), "{silent}");
+    }
+}
+
+#[test]
+fn notes_on_the_logs_are_in_the_page_and_in_json() {
+    let notes = vec!["hall.people.csv: nothing matches".to_owned()];
+    let benchmark = Benchmark { notes: notes.clone(), ..two_by_three() };
+    assert!(html(&benchmark, None).contains("Note: hall.people.csv: nothing matches."));
+    let text = json(&benchmark).expect("JSON");
+    assert_eq!(serde_json::from_str::<Benchmark>(&text).expect("JSON").notes, notes);
+    assert!(!json(&two_by_three()).expect("JSON").contains("\"notes\""));
+}
+
+#[test]
 fn a_mean_of_two_logs_shows_no_interval() {
     let two = [("a", "x", 0.25), ("a", "y", 0.35), ("b", "x", 0.75), ("b", "y", 0.7)];
     let three = [&two[..], &[("a", "z", 0.3), ("b", "z", 0.72)]].concat();

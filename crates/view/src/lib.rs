@@ -39,7 +39,7 @@ use clap::Args;
 use tagalong_app::missed::Rules;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, spare, write_file};
 use tagalong_app::remedies::Remedies;
-use tagalong_app::scoring::TruthFile;
+use tagalong_app::scoring::{TruthFile, is_of_whole_bodies};
 use tagalong_config::Registry;
 use tagalong_math::counted;
 
@@ -312,7 +312,7 @@ fn read_truth(
     notes: &mut Vec<String>,
 ) -> Result<Option<PageTruth>, Failure> {
     let named = args.truth.clone().map(|path| {
-        let is_whole = path.to_string_lossy().ends_with(".boxes.csv");
+        let is_whole = is_of_whole_bodies(&path);
         (path, is_whole)
     });
     let Some((path, is_whole)) = named.or_else(|| TruthFile::beside(log).ok().flatten()) else {

@@ -1,5 +1,6 @@
 //! Reads files of truth and tracks into a sequence that can be scored.
 
+mod beside;
 mod extents;
 mod other_log;
 mod shots;
@@ -12,8 +13,9 @@ use std::path::Path;
 
 use crate::outcome::Failure;
 use crate::suggest::file_hint;
+pub use beside::{annotated_file, files_of, is_of_whole_bodies};
 pub use extents::extents_note;
-pub use other_log::other_log_notes;
+pub use other_log::{match_note, other_log_notes, truth_notes};
 pub use shots::{Shot, Shots};
 use tagalong_config::{FileLimit, read_text as read_bounded};
 use tagalong_eval::formats::{OddLines, kitti};

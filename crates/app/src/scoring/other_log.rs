@@ -2,16 +2,50 @@
 
 use std::path::Path;
 
+use super::beside::log_of;
 use super::{Shots, TruthFile};
 
-/// Endings of truth that is named after its log.
-const OF_A_LOG: [&str; 6] =
-    [".people.csv", ".boxes.csv", ".truth.jsonl", ".jsonl", ".mcap", ".bag"];
+/// Endings of other truth that is named after its log.
+const OTHER_ENDINGS: [&str; 3] = [".jsonl", ".mcap", ".bag"];
 /// Number of frames that a truth may go on behind the last one that the log gave: images at the end may
 /// have lost their depth.
 const BEYOND: u32 = 5;
 /// Part of the boxes that lie outside of the image, by their middles, from which on it is another image.
 const OUTSIDE: f64 = 0.2;
+/// Part of the annotated people of whom fewer are matched if the truth is that of another log: by chance a
+/// few of their boxes lie on tracks.
+const BY_CHANCE: f64 = 0.1;
+
+/// Returns the notes on a truth beside the frames of a log: the signs that it is that of another one, and
+/// people that end far before the log does.
+pub fn truth_notes(
+    path: &Path,
+    truth: &TruthFile,
+    log_name: Option<&str>,
+    shots: &Shots,
+) -> Vec<String> {
+    let mut notes = other_log_notes(path, truth, log_name, shots);
+    notes.extend(truth.early_end(&file_name(path), shots));
+    notes
+}
+
+/// Returns the question that a truth raises of whose `people`, over all frames, tracks match only `matched`
+/// or none.
+pub fn match_note(path: &Path, people: u64, matched: u64, reports: u64) -> Option<String> {
+    if reports == 0 || matched as f64 >= BY_CHANCE * people as f64 {
+        return None;
+    }
+    let told = if matched == 0 {
+        "nothing matches".to_owned()
+    } else {
+        format!("only {matched} of {people} annotated people match")
+    };
+    Some(format!("{}: {told}: is it the truth of another log?", file_name(path)))
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
 
 /// Returns notes with the signs that a truth is that of another log: its name, its number of frames, its
 /// stamps, and the size of the image in which its boxes lie. `log_name` is the file name of the log, if it
@@ -22,7 +56,7 @@ pub fn other_log_notes(
     log_name: Option<&str>,
     shots: &Shots,
 ) -> Vec<String> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let name = file_name(path);
     let mut signs: Vec<String> =
         log_name.and_then(|log| by_name(&name, truth, log)).into_iter().collect();
     signs.extend(by_frames(&name, truth, shots));
@@ -45,7 +79,8 @@ fn is_of_other_times(truth: &TruthFile, without: usize) -> bool {
 
 /// Returns the sign of a truth that is named after another log.
 fn by_name(name: &str, truth: &TruthFile, log: &str) -> Option<String> {
-    let of_truth = OF_A_LOG.iter().find_map(|ending| name.strip_suffix(ending))?;
+    let of_truth = log_of(name)
+        .or_else(|| OTHER_ENDINGS.iter().find_map(|ending| name.strip_suffix(ending)))?;
     let stem = Path::new(log).file_stem()?.to_string_lossy().into_owned();
     let is_other = of_truth != stem && !(truth.is_in_log() && name == log);
     is_other.then(|| format!("{name} is named after {of_truth}, and the run is of {log}"))
@@ -153,6 +188,35 @@ mod tests {
         assert!(notes("gt.txt", 24, 10.0, Some("walk.mcap"), "").is_empty());
         let info = "name=a\nframeRate=10\nseqLength=20\nimWidth=640\nimHeight=480\n";
         assert!(notes("gt.txt", 20, 10.0, Some("walk.mcap"), info).is_empty());
+    }
+
+    #[test]
+    fn people_whom_nothing_matches_raise_a_question() {
+        let path = Path::new("logs/walk.people.csv");
+        for (people, matched, reports, told) in [
+            (32, 0, 181, Some("walk.people.csv: nothing matches: is it the truth of another log?")),
+            (32, 2, 181, Some("walk.people.csv: only 2 of 32 annotated people match")),
+            (32, 4, 181, None),
+            // Without tracks, and without people, nothing can match.
+            (32, 0, 0, None),
+            (0, 0, 181, None),
+        ] {
+            let note = match_note(path, people, matched, reports);
+            assert_eq!(note.is_some(), told.is_some(), "{matched} of {people}: {note:?}");
+            assert!(note.unwrap_or_default().starts_with(told.unwrap_or_default()));
+        }
+    }
+
+    #[test]
+    fn a_truth_that_ends_early_is_told_with_the_signs() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("other.boxes.csv");
+        std::fs::write(&path, "1,1,10,10,40,90,1,-1,-1,-1\n").expect("a file");
+        let truth = TruthFile::read(&path, TruthOptions::default()).expect("a truth");
+        let notes = truth_notes(&path, &truth, Some("walk.mcap"), &shots());
+        let [name, end] = &notes[..] else { panic!("{notes:?}") };
+        assert!(name.contains("is named after other"), "{name}");
+        assert!(end.starts_with("other.boxes.csv: its last frame with people is 1,"), "{end}");
     }
 
     #[test]

@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::outcome::Failure;
-use crate::suggest::runs_in;
+use crate::suggest::{is_run, runs_in};
 use serde::Deserialize;
 use tagalong_eval::Report;
 use tagalong_eval::formats::{Timeline, kitti, metres, mot};
@@ -50,6 +50,14 @@ impl Tracks {
         if path.is_dir() {
             return Self::of_run(path, length);
         }
+        // A file in the folder of a run is of the log of that run.
+        if let Some(run) = path.parent().filter(|folder| is_run(folder)) {
+            return Self::of_file(path, length)?.with_facts(run);
+        }
+        Self::of_file(path, length)
+    }
+
+    fn of_file(path: &Path, length: Option<u32>) -> Result<Self, Failure> {
         let text = read_text(path)?;
         let name = path.display().to_string();
         let first = text.lines().next().unwrap_or_default();
@@ -103,17 +111,23 @@ impl Tracks {
         let mut tracks = Self::of_boxes(&text, &name, length)?;
         let (text, name) = text_and_name(folder.join("tracks-metres.csv"))?;
         merge(&mut tracks.reports, places(&text, &name, length)?);
-        let (text, name) = text_and_name(folder.join("report.json"))?;
+        Self { in_robot_frame: true, ..tracks }.with_facts(folder)
+    }
+
+    /// Adds the facts that the folder of a run has: its log, and a note if it is not whole.
+    fn with_facts(mut self, folder: &Path) -> Result<Self, Failure> {
+        let path = folder.join("report.json");
+        let text = read_text(&path)?;
         let facts: RunFacts = serde_json::from_str(&text)
-            .map_err(|error| Failure::failed(format!("{name}: {error}")))?;
+            .map_err(|error| Failure::failed(format!("{}: {error}", path.display())))?;
         if facts.ended != complete() {
-            tracks.notes.push(format!(
+            self.notes.push(format!(
                 "{}: the run is not whole ({}); the frames after its end count as frames without tracks",
                 folder.display(),
                 facts.ended
             ));
         }
-        Ok(Self { log_name: Some(facts.log.name), in_robot_frame: true, ..tracks })
+        Ok(Self { log_name: Some(facts.log.name), ..self })
     }
 }
 

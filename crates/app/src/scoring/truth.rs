@@ -11,6 +11,7 @@ use tagalong_eval::{Region, Role, Truth};
 use tagalong_geometry::{Camera, HEAD_RADIUS_M, Rect};
 use tagalong_log::{Limits, TRUTH_TOPIC, TruthFrame, TruthPerson, read_truth, read_truth_lines};
 
+use super::beside::file_beside;
 use super::{Shots, odd_labels, read_text, region, without_area};
 
 /// Largest difference between the stamps of an image and its truth in a log, ns.
@@ -105,13 +106,8 @@ impl TruthFile {
     /// A log without a file beside it that cannot be read.
     pub fn beside(log: &Path) -> Result<Option<(PathBuf, bool)>, Failure> {
         // Files beside the log take precedence, so that they can replace the log's own truth.
-        for (ending, has_boxes) in
-            [("people.csv", false), ("truth.jsonl", false), ("boxes.csv", true)]
-        {
-            let file = log.with_extension(ending);
-            if file.is_file() {
-                return Ok(Some((file, has_boxes)));
-            }
+        if let Some(found) = file_beside(log) {
+            return Ok(Some(found));
         }
         Ok(read_truth(log, &Limits::default())?.map(|_| (log.to_owned(), false)))
     }
@@ -405,14 +401,11 @@ fn is_of_run(path: &Path) -> bool {
 /// Returns the failure of a log without truth, with the file of truth beside it.
 fn without_truth(log: &Path) -> Failure {
     let shown = log.display();
-    for ending in ["people.csv", "truth.jsonl", "boxes.csv"] {
-        let beside = log.with_extension(ending);
-        if beside.is_file() {
-            let beside = beside.display();
-            return Failure::usage(format!(
-                "{shown} has no truth in it, and {beside} is beside it: `--truth {beside}`"
-            ));
-        }
+    if let Some((beside, _)) = file_beside(log) {
+        let beside = beside.display();
+        return Failure::usage(format!(
+            "{shown} has no truth in it, and {beside} is beside it: `--truth {beside}`"
+        ));
     }
     Failure::failed(format!("{shown} has no truth: no channel {TRUTH_TOPIC}"))
 }

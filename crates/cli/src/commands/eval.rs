@@ -3,14 +3,15 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
+use serde_json::Value;
 use tagalong_app::config_file::{ConfigFile, OuterSettings};
 use tagalong_app::format::Format;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print};
 use tagalong_app::scoring::{
     Rate, RulesChoice, Shots, Tracks, TruthFile, TruthOptions, assemble, comparable, comparison,
-    extents_note, other_log_notes, with_remedy,
+    extents_note, match_note, truth_notes, with_remedy,
 };
-use tagalong_app::serialize::{to_json, to_json_line};
+use tagalong_app::serialize::to_json;
 use tagalong_app::suggest::check_log_path;
 use tagalong_eval::formats::mot::Rules;
 use tagalong_eval::{EvalError, Repaired, Scores, Sequence, Similarity, repairs};
@@ -18,8 +19,8 @@ use tagalong_eval::{EvalError, Repaired, Scores, Sequence, Similarity, repairs};
 /// Arguments of `tagalong eval`.
 #[derive(Args, Debug)]
 pub struct EvalArgs {
-    /// Ground truth: MOTChallenge text, people.csv, KITTI labels, a log with the channel
-    /// /truth/people, or the messages of that channel, line by line (.jsonl).
+    /// Ground truth: MOTChallenge text, people.csv, people-floor.csv, KITTI labels, a log with the
+    /// channel /truth/people, or the messages of that channel, line by line (.jsonl).
     #[arg(long, value_name = "FILE")]
     pub truth: PathBuf,
     /// Reported tracks: MOTChallenge text, KITTI labels, tracks-metres.csv, or the folder of a run.
@@ -129,9 +130,14 @@ fn scored(args: &EvalArgs) -> Result<Scored, Failure> {
     let scores = Scores::measure(&sequence, comparison).map_err(|error| refused(args, &error))?;
     let repairs = args.repairs.then(|| repairs(&sequence, &comparison));
     let repairs = repairs.transpose().map_err(|error| refused(args, &error))?;
-    if similarity == Similarity::Iou {
-        notes.extend(extents_note(&sequence, scores.recall));
-    }
+    let extents = match similarity {
+        Similarity::Iou => extents_note(&sequence, scores.recall),
+        Similarity::Metres => None,
+    };
+    // Boxes of another kind are reason enough that nothing matches.
+    let unmatched =
+        extents.or_else(|| match_note(&args.truth, scores.truths, scores.tp, scores.reports));
+    notes.extend(unmatched);
     if scores.has_constant_scores() {
         notes.push(format!("{}: {CONSTANT_SCORES}", args.tracks.display()));
     }
@@ -214,8 +220,7 @@ fn judged(args: &EvalArgs) -> Result<Judged, Failure> {
         ));
     }
     let mut notes = std::mem::take(&mut truth.notes);
-    notes.extend(other_log_notes(&args.truth, &truth, tracks.log_name.as_deref(), &shots));
-    notes.extend(truth.early_end(&args.truth.display().to_string(), &shots));
+    notes.extend(truth_notes(&args.truth, &truth, tracks.log_name.as_deref(), &shots));
     notes.extend(longer(args, truth.last(&shots).max(shots.last()), &tracks));
     notes.extend(tracks.notes);
     notes.extend(assumed_rate(args, &truth, &shots));
@@ -302,20 +307,62 @@ fn no_place(args: &EvalArgs, truth: &TruthFile) -> Failure {
     })
 }
 
-/// Formats one figure per line, in the order of the fields, then the rules and the notes.
+/// Groups of figures under the headings of docs/reference/figures.md, each in the order in which it is
+/// printed.
+const GROUPS: [(&str, &[&str]); 4] = [
+    (
+        "Tracking",
+        &[
+            "HOTA", "IDF1", "MOTA", "DetA", "AssA", "LocA", "DetRe", "DetPr", "AssRe", "AssPr",
+            "MOTP", "TP", "FN", "FP", "IDSW", "Frag", "MT", "PT", "ML", "IDP", "IDR", "IDTP",
+            "IDFN", "IDFP",
+        ],
+    ),
+    (
+        "Detection",
+        &[
+            "recall",
+            "recall_free",
+            "recall_partly_hidden",
+            "precision",
+            "fp_per_frame",
+            "LAMR",
+            "AP",
+            "distinct_scores",
+        ],
+    ),
+    (
+        "Places and times",
+        &[
+            "OSPA",
+            "GOSPA",
+            "position_error_mean_m",
+            "position_error_rms_m",
+            "position_error_p95_m",
+            "position_error_max_m",
+            "time_to_confirm_mean_s",
+            "never_confirmed",
+            "time_to_reacquire_mean_s",
+            "never_reacquired",
+            "wrong_person_s",
+        ],
+    ),
+    ("Counts", &["frames", "truths", "reports", "truth_ids", "track_ids"]),
+];
+
+/// Formats the notes, then the figures by groups, one per line.
 fn as_text(said: &Said<'_>) -> Result<String, Failure> {
-    // The JSON text keeps the order of the fields, which a parsed map would not.
-    let json = to_json_line("the scores", said.scores)?;
+    let figures = serde_json::to_value(said.scores).map_err(Failure::failed)?;
     let mut out = String::new();
-    let inside = json.trim_end().trim_start_matches('{').trim_end_matches('}');
-    for field in inside.split(',') {
-        let (name, value) = field.split_once(':').unwrap_or((field, ""));
-        let value = match (value, value.parse::<f64>()) {
-            ("null", _) => "-".to_owned(),
-            (text, Ok(number)) if text.contains(['.', 'e']) => format!("{number:.4}"),
-            (text, _) => text.to_owned(),
-        };
-        let _ = writeln!(out, "{:<24} {value:>10}", name.trim_matches('"'));
+    for note in said.notes {
+        let _ = writeln!(out, "note: {note}");
+    }
+    for (heading, names) in GROUPS {
+        let gap = if out.is_empty() { "" } else { "\n" };
+        let _ = writeln!(out, "{gap}{heading}");
+        for name in names {
+            let _ = writeln!(out, "{name:<24} {:>10}", figure(&figures[*name]));
+        }
     }
     if let Some(rules) = said.rules {
         let _ = writeln!(out, "{:<24} {rules:>10}", "rules");
@@ -323,10 +370,16 @@ fn as_text(said: &Said<'_>) -> Result<String, Failure> {
     if let Some(repairs) = said.repairs {
         add_repairs(&mut out, said.scores, repairs);
     }
-    for note in said.notes {
-        let _ = writeln!(out, "note: {note}");
-    }
     Ok(out)
+}
+
+/// Formats a figure: a count as it is, and "-" for one that makes no sense on the input.
+fn figure(value: &Value) -> String {
+    match (value.as_u64(), value.as_f64()) {
+        (Some(count), _) => count.to_string(),
+        (None, Some(figure)) => format!("{figure:.4}"),
+        (None, None) => "-".to_owned(),
+    }
 }
 
 /// Adds a table of the figures as they are, and with one kind of error repaired.
@@ -339,5 +392,44 @@ fn add_repairs(out: &mut String, scores: &Scores, repairs: &[Repaired]) {
         let [hota, mota, idf1] =
             figures.map(|figure| figure.map_or_else(|| "-".to_owned(), |f| format!("{f:.4}")));
         let _ = writeln!(out, "{name:<24} {hota:>10} {mota:>10} {idf1:>10}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn each_figure_is_in_one_group_and_the_headings_are_those_of_the_reference() {
+        let printed = serde_json::to_value(Scores::default()).expect("figures");
+        let all: BTreeSet<&str> =
+            printed.as_object().expect("an object").keys().map(String::as_str).collect();
+        let grouped: Vec<&str> =
+            GROUPS.iter().flat_map(|(_, names)| names.iter().copied()).collect();
+        assert_eq!(grouped.len(), all.len(), "none twice");
+        assert_eq!(grouped.into_iter().collect::<BTreeSet<_>>(), all);
+        let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/figures.md");
+        let page = std::fs::read_to_string(page).expect("the page");
+        for (heading, _) in GROUPS {
+            assert!(page.contains(&format!("\n## {heading}\n")), "{heading}");
+        }
+    }
+
+    #[test]
+    fn notes_come_first_and_the_leading_figures_after_them() {
+        let scores = Scores { hota: Some(0.25), frames: 7, ..Scores::default() };
+        let notes = ["odd".to_owned()];
+        let said = Said { scores: &scores, repairs: None, rules: None, notes: &notes };
+        let text = as_text(&said).expect("a text");
+        let mut lines: Vec<Vec<&str>> =
+            text.lines().map(|line| line.split_whitespace().collect()).collect();
+        assert!(lines.contains(&vec!["frames", "7"]), "{text}");
+        lines.truncate(6);
+        let [note, gap, heading, hota, idf1, mota] = &lines[..] else { panic!("{text}") };
+        assert_eq!((&note[..], gap.len()), (&["note:", "odd"][..], 0));
+        assert_eq!((&heading[..], &hota[..]), (&["Tracking"][..], &["HOTA", "0.2500"][..]));
+        assert_eq!((&idf1[..], &mota[..]), (&["IDF1", "-"][..], &["MOTA", "-"][..]));
     }
 }

@@ -71,6 +71,56 @@ fn a_config_for_other_cameras_is_named_once_with_its_logs() {
                     config is for 2 to 3 m), short (";
     assert_eq!(said.matches(expected).count(), 1, "{said}");
     assert_eq!(said.matches("is by its [suits]").count(), 1, "{said}");
+    assert!(said.contains("6 tasks planned: 3 configs on 2 logs; --configs limits them"), "{said}");
+    // Several have one line.
+    home.config("higher", "[suits]\ncamera_height_m = [3.0, 4.0]\n");
+    let output = home.bench(&["plan", "--logs-dir", "logs", "-o", "out"]);
+    let said = text(&output.stderr);
+    let expected = "note: 2 configs are by their [suits] not made for some of the logs, where tracks are \
+                    worse: high (2 logs), higher (2 logs)";
+    assert!(said.contains(expected) && said.matches("[suits]").count() == 1, "{said}");
+}
+
+#[test]
+fn the_truth_of_another_log_is_noted_in_all_forms_of_the_report() {
+    let home = Home::new();
+    fs::write(home.path("logs/short.people.csv"), crate::common::people(40)).unwrap();
+    fs::remove_file(home.path("logs/long.people.csv")).unwrap();
+    let corner: String = (1..=24).map(|n| format!("{n},1,0,0,9,20,1,1,1\n")).collect();
+    fs::write(home.path("logs/long.boxes.csv"), corner).unwrap();
+    let output = home.bench(&["--logs-dir", "logs", "-o", "out"]);
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    let said = text(&output.stdout);
+    let json = home.report("out")["notes"].to_string();
+    let page = fs::read_to_string(home.path("out/report.html")).unwrap();
+    for note in [
+        "short.people.csv has people up to frame 40, and the last of the log is 9: if the truth is that \
+         of another log, the comparison means nothing",
+        "long.boxes.csv: nothing matches: is it the truth of another log?",
+    ] {
+        // Once for both pipelines.
+        assert_eq!(said.matches(note).count(), 1, "{said}");
+        assert!(json.contains(note), "{json}");
+        assert!(page.contains(note), "{note}");
+    }
+}
+
+#[test]
+fn places_on_the_floor_are_truth_beside_a_log() {
+    let home = Home::new();
+    fs::remove_file(home.path("logs/long.people.csv")).unwrap();
+    let header = "scan,id,x_laser_m,y_laser_m,x_robot_m,y_robot_m,ignore,source\n";
+    let rows = "15,7,2.88,-0.18,2.88,-0.18,0,annotated\n19,7,2.88,-0.1,2.88,-0.1,0,annotated\n";
+    fs::write(home.path("logs/long.people-floor.csv"), format!("{header}{rows}")).unwrap();
+    let output = home.bench(&["--logs-dir", "logs", "--configs", "configs/near.toml", "-o", "out"]);
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    let said = text(&output.stdout);
+    let floor = said.split_once("on the floor, as the truth has no boxes:").unwrap().1;
+    assert!(floor.contains("long") && !floor.contains("short"), "{said}");
+    let report = home.report("out");
+    let task = &report["tasks"][0];
+    assert_eq!((task["log"].as_str(), task["image"].is_null()), (Some("long"), true), "{task}");
+    assert_eq!(task["metres"]["TP"].as_u64(), Some(2), "{task}");
 }
 
 /// All files of a folder that are not times, by name.
@@ -260,6 +310,21 @@ fn a_log_that_lacks_depth_is_skipped_with_the_reason() {
 }
 
 #[test]
+fn a_log_of_scans_alone_is_not_sent_to_annotate() {
+    let Some(scans) = tagalong_conformance::testdata::find("laser/laser-moving.mcap") else {
+        return;
+    };
+    let home = Home::new();
+    fs::copy(scans, home.path("logs/scans.mcap")).unwrap();
+    for arguments in [["--logs-dir", "logs"], ["--logs", "logs/scans.mcap"]] {
+        let output = home.bench(&[&["plan", "-o", "out"][..], &arguments].concat());
+        let said = text(&output.stderr);
+        assert!(said.contains("scans.mcap has no truth"), "{said}");
+        assert!(said.contains("NAME.people-floor.csv") && !said.contains("annotate"), "{said}");
+    }
+}
+
+#[test]
 fn a_pipeline_that_can_detect_nothing_is_skipped_with_the_reason_that_run_gives() {
     let home = Home::new();
     for config in ["omni-rich", "onnx"] {
@@ -334,8 +399,9 @@ fn doubled_ids_of_a_truth_are_dropped_if_asked_for() {
     let failed = home.report("out")["tasks"][0]["outcome"].clone();
     let why = failed["why"].as_str().unwrap_or_default();
     assert!(why.contains("occurs twice") && why.contains("`--drop-doubled-ids`"), "{failed}");
-    let told = ok(home.bench(&[&only[..], &["-o", "dropped", "--drop-doubled-ids"]].concat()));
-    assert!(told.contains("1 people are left out"), "{told}");
+    ok(home.bench(&[&only[..], &["-o", "dropped", "--drop-doubled-ids"]].concat()));
+    let notes = home.report("dropped")["notes"].to_string();
+    assert!(notes.contains("\"short.people.csv: 1 people are left out"), "{notes}");
     assert_eq!(home.report("dropped")["tasks"][0]["outcome"]["ended"], "done");
     assert_ne!(home.plan("out")[0]["hash"], home.plan("dropped")[0]["hash"], "another result");
 }

@@ -132,10 +132,13 @@ fn truth_that_is_named_after_another_log_is_noted() {
     for name in ["other.people.csv", "truth.csv"] {
         fs::copy(folder.path().join("walk.people.csv"), folder.path().join(name)).unwrap();
     }
-    for (truth, is_noted) in
-        [("walk.people.csv", false), ("other.people.csv", true), ("truth.csv", false)]
-    {
-        let output = in_home(folder.path(), &["--truth", truth, "--tracks", "out"]);
+    for (truth, tracks, is_noted) in [
+        ("walk.people.csv", "out", false),
+        ("other.people.csv", "out", true),
+        ("other.people.csv", "out/tracks.csv", true),
+        ("truth.csv", "out", false),
+    ] {
+        let output = in_home(folder.path(), &["--truth", truth, "--tracks", tracks]);
         let said = text(&output.stdout);
         assert_eq!(code(&output), 0, "{}", text(&output.stderr));
         assert_eq!(
@@ -143,6 +146,19 @@ fn truth_that_is_named_after_another_log_is_noted() {
             is_noted,
             "{said}"
         );
+    }
+}
+
+#[test]
+fn a_truth_that_nothing_matches_is_asked_about() {
+    let folder = home();
+    let elsewhere = "1,1,0,0,20,20,1,-1,-1,-1\n20,1,0,0,20,20,1,-1,-1,-1\n";
+    write(folder.path(), "walk.txt", elsewhere);
+    for (truth, is_asked) in [("walk.txt", true), ("walk.people.csv", false)] {
+        let output = in_home(folder.path(), &["--truth", truth, "--tracks", "out"]);
+        let said = text(&output.stdout);
+        let question = "nothing matches: is it the truth of another log?";
+        assert_eq!(said.contains(question), is_asked, "{said}");
     }
 }
 
@@ -323,7 +339,7 @@ fn rules_odd_boxes_and_constant_scores_are_said() {
     assert_eq!(notes.len(), 2, "{notes:?}");
     let printed = scored(&truth_with("1"), &tracks, &[]);
     let printed = text(&printed.stdout);
-    assert!(printed.contains("\nnote: tracks.txt: 1 of 3 boxes have no area"), "{printed}");
+    assert!(printed.starts_with("note: tracks.txt: 1 of 3 boxes have no area"), "{printed}");
     assert!(printed.contains("LAMR and AP mean nothing") && printed.contains("MOT17"), "{printed}");
     // Scores with an order: no note is needed.
     let ordered = TRACKS.replacen("90,1,", "90,0.5,", 1);

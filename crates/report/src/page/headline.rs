@@ -19,6 +19,7 @@ impl Page<'_> {
         html! {
             @if let Some(verdict) = self.verdict() { p class="verdict" { (verdict) } }
             @if shown.is_empty() { p { "No task has been compared with a truth, so there are no figures." } }
+            @for note in self.view.notes { p class="bad" { "Note: " (note.trim_end_matches('?')) (if note.ends_with('?') { "?" } else { "." }) } }
             @for logs in self.view.copies { p class="bad" { (copies_note(logs)) "." } }
             @if skipped > 0 {
                 p {

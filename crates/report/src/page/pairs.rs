@@ -24,6 +24,9 @@ struct ErrorKind {
     decimals: usize,
     /// Words for the pipeline that has more of it, before and after the number.
     words: [&'static str; 2],
+    /// True for errors of identity, of which the first one is named: a track that goes over to another
+    /// person costs more than a new ID for the same one.
+    is_of_identity: bool,
 }
 
 /// Cause of misses.
@@ -35,18 +38,27 @@ struct Costly<'a> {
 }
 
 /// Errors beside misses, which are named by their tests.
-const ERROR_KINDS: [ErrorKind; 2] = [
+const ERROR_KINDS: [ErrorKind; 3] = [
     ErrorKind {
         figure: "image.fp_per_frame",
         least: 0.02,
         decimals: 2,
         words: ["reports", "false people per frame"],
+        is_of_identity: false,
+    },
+    ErrorKind {
+        figure: "image.wrong_person_s",
+        least: 0.5,
+        decimals: 1,
+        words: ["follows the wrong person for", "s per log"],
+        is_of_identity: true,
     },
     ErrorKind {
         figure: "image.IDSW",
         least: 0.5,
         decimals: 1,
         words: ["switches IDs", "times per log"],
+        is_of_identity: true,
     },
 ];
 
@@ -111,9 +123,14 @@ impl Page<'_> {
             };
             line += &format!("; {why}");
         }
+        let mut has_identity = false;
         for kind in &ERROR_KINDS {
+            if kind.is_of_identity && has_identity {
+                continue;
+            }
             if let Some(difference) = self.errors_of_pair(kind, better.2, worse.2) {
                 line += &format!("; {difference}");
+                has_identity |= kind.is_of_identity;
             }
         }
         Some(line)
