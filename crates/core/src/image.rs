@@ -110,6 +110,12 @@ impl DepthImage {
         Self::from_pixels(width, height, metres)
     }
 
+    /// Returns true for a depth that was measured: a number above 0.
+    pub fn is_reading(metres: f32) -> bool {
+        // `&` instead of `&&` avoids a branch per reading.
+        (metres > 0.0) & (metres < f32::INFINITY)
+    }
+
     /// Returns the depth of the surface in the middle of a region, m: the median of 5x5 samples in
     /// its central half, of which at least 8 must be readings.
     pub fn surface_m(&self, of: &Rect) -> Option<f64> {
@@ -118,7 +124,7 @@ impl DepthImage {
         // An array instead of a vector saves an allocation per region.
         let mut sorted = [f32::INFINITY; TAPS * TAPS];
         let readings = rows.into_iter().flat_map(|y| self.readings(&columns, y));
-        let readings = readings.filter(|metres| is_reading(*metres));
+        let readings = readings.filter(|metres| Self::is_reading(*metres));
         let mut count = 0;
         for (to, metres) in sorted.iter_mut().zip(readings) {
             *to = metres;
@@ -154,7 +160,7 @@ impl DepthImage {
         let mut readings: Vec<f32> = rows
             // A face on the right of the image starts beyond the row.
             .flat_map(|y| self.row(y).get(left..right).unwrap_or_default().iter().copied())
-            .filter(|metres| is_reading(*metres))
+            .filter(|metres| Self::is_reading(*metres))
             .collect();
         // The median ignores the background that shows beside a narrow face.
         readings.sort_by(f32::total_cmp);
@@ -179,11 +185,6 @@ fn taps(from: f64, size: f64) -> [usize; TAPS] {
 /// number.
 fn metres_of(millimetres: u16) -> f32 {
     if matches!(millimetres, 0 | u16::MAX) { f32::NAN } else { f32::from(millimetres) * 0.001 }
-}
-
-fn is_reading(metres: f32) -> bool {
-    // `&` instead of `&&` avoids a branch per reading.
-    (metres > 0.0) & (metres < f32::INFINITY)
 }
 
 #[cfg(test)]
