@@ -482,7 +482,8 @@ fn measure(row: &mut DepthRow, sensor: &DepthSensor, seed: u64, y: u64) {
         let coarse = coarse[x];
         let fine = 0.75 + 0.5 * uniform_at(seed ^ 0x52, y << 20 | x64);
         let returns = (t >= nearest) & (t <= farthest) & (light > LEAST_RETURN * coarse * fine);
-        let disparity = steps / t + normal_at(seed ^ 0x53, first.wrapping_add(x64)) / SIGMAS_PER_STEP;
+        let disparity =
+            steps / t + normal_at(seed ^ 0x53, first.wrapping_add(x64)) / SIGMAS_PER_STEP;
         let whole = disparity.round();
         let measured = (steps / if whole > 1.0 { whole } else { 1.0 }) as f32;
         *depth_m = if returns { measured } else { f32::NAN };

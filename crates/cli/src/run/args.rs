@@ -201,7 +201,8 @@ mod tests {
         for choice in CHOICES.iter().filter(|choice| choice.config != NETWORK) {
             assert!(help.contains(&format!(" {}", choice.config)), "{}: {help}", choice.config);
         }
-        let pipeline = help.split("The pipeline,").nth(1).and_then(|rest| rest.split("[default").next());
+        let pipeline =
+            help.split("The pipeline,").nth(1).and_then(|rest| rest.split("[default").next());
         assert_eq!(pipeline.map(|text| text.contains(" network,")), Some(false));
     }
 

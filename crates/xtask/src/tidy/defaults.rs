@@ -37,7 +37,8 @@ pub fn wrong(readme: &str, of_plugin: &BTreeMap<&str, &str>) -> Vec<String> {
             if let (Some(told_number), Some(number)) = (number(told), number(default))
                 && told_number != number
             {
-                complaints.push(format!("says {told} for `{key}`, of which the default is {default}"));
+                complaints
+                    .push(format!("says {told} for `{key}`, of which the default is {default}"));
             }
         }
     }
@@ -76,7 +77,10 @@ mod tests {
         let defaults = of_page(PAGE);
         for (row, expected) in [
             ("| `a`, `b` | 2, -0.50 | right |", &[][..]),
-            ("| `a`, `b` | 3, -0.5 | the first is wrong |", &["says 3 for `a`, of which the default is 2"]),
+            (
+                "| `a`, `b` | 3, -0.5 | the first is wrong |",
+                &["says 3 for `a`, of which the default is 2"],
+            ),
             ("| `b` | `0.5` | wrong |", &["says 0.5 for `b`, of which the default is -0.5"]),
             ("| `a` | by family | words |", &[]),
             ("| `w` | 3 | a number for a word |", &[]),
