@@ -66,6 +66,8 @@ fn every_check_of_detectors_can_fail() {
         ("blind", "one person at 2 m is found"),
         ("short-sighted", "a person is found near their track"),
         ("remembers", "people who left are forgotten"),
+        ("borrows-a-name", "its tests have names of their own"),
+        ("advises-on-others", "its tests have names of their own"),
         ("likes-left", "likelihood: the true scene outweighs a shifted one"),
         ("first-only", "likelihood: the order of people does not matter"),
         ("infinite", "likelihood: is finite on odd scenes"),

@@ -397,6 +397,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     use tagalong_config::commented_defaults;
+    use tagalong_core::TRACKER_TESTS;
     use tagalong_pipeline::PipelineSettings;
 
     use super::*;
@@ -554,6 +555,17 @@ mod tests {
             ("manager", sprt, "[manager] plugin = \"manage-sprt\""),
         ] {
             assert_eq!(Change::of(&resolved, key, &value).line, line);
+        }
+    }
+
+    /// A detector with such a test would get the advice for the tracker's.
+    #[test]
+    fn detectors_must_not_take_the_names_of_tests_of_the_tracker() {
+        for remedy in Remedies::default().all() {
+            // Two parts are of one stage, which the first names; `occupied` is a test of detectors.
+            let is_of_tracker = !remedy.test.contains(':') && remedy.test != "occupied";
+            let is_known = TRACKER_TESTS.contains(&remedy.test.as_str());
+            assert_eq!(is_known, is_of_tracker, "{}", remedy.test);
         }
     }
 

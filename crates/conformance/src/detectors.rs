@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use nalgebra::Point3;
-use tagalong_core::{Detection, Detector, Error, Frame, Funnel, Inputs, Query, Usage};
+use tagalong_core::{
+    Detection, Detector, Error, Frame, Funnel, Inputs, Query, TRACKER_TESTS, Usage,
+};
 use tagalong_geometry::Camera;
 
 use crate::figure::Figure;
@@ -26,6 +28,7 @@ pub(crate) const CHECKS: &[Check] = &[
     ("one person at 2 m is found", person_is_found),
     ("a person is found near their track", person_is_followed),
     ("people who left are forgotten", forgets),
+    ("its tests have names of their own", tests_have_own_names),
 ];
 
 const EVERYWHERE: Query<'_> = Query::Discover { occupied: &[] };
@@ -382,6 +385,32 @@ fn forgets(subject: &Subject<'_>) -> Verdict {
     let mut found = people(detector, &frame, &EVERYWHERE)?;
     found.extend(people(detector, &frame, &Query::Track(&tracked))?);
     believed_empty(&found, "after the person has left")
+}
+
+/// Checks the names under which candidates are dropped, and those of the advice: `doctor` would
+/// explain a test of the detector by the settings of the tracker.
+fn tests_have_own_names(subject: &Subject<'_>) -> Verdict {
+    let all = subject.registry.all_remedies();
+    let own = all.filter(|(plugin, _)| *plugin == subject.info.name);
+    let mut names: Vec<&str> = own.map(|(_, remedy)| remedy.test).collect();
+    let camera = level();
+    let lost = track(1, Figure::at(2.0, 0.4).head, 0.15, &camera);
+    let detector = &mut *subject.detector(From::Nothing)?;
+    for frame in walk(&camera) {
+        for query in [EVERYWHERE, Query::Track(&lost)] {
+            let mut funnel = Funnel::default();
+            // Other checks tell of errors.
+            let _ = detector.detect(&frame, &query, &mut funnel);
+            names.extend(funnel.entries().iter().map(|entry| entry.test));
+        }
+    }
+    match names.into_iter().find(|name| TRACKER_TESTS.contains(name)) {
+        Some(name) => Err(format!(
+            "`{name}` is the name of a test of the tracker: call it `{}: {name}`",
+            subject.info.name
+        )),
+        None => Ok(()),
+    }
 }
 
 #[cfg(test)]

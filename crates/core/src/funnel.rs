@@ -20,6 +20,25 @@ pub struct Dropped {
 /// and a bound for tests that look at every pixel.
 pub const MAX_PLACES: usize = 48;
 
+/// Names of the tests of the tracker and of track managers. A detector gives its tests other names,
+/// as in `"depth-net: peak"`: the settings that decide a test are found by its name.
+pub const TRACKER_TESTS: [&str; 14] = [
+    "associator",
+    "association not possible",
+    "clutter",
+    "doubt",
+    "filter",
+    "gate",
+    "no track fits",
+    "no track numbers left",
+    "rather a new person",
+    "same person",
+    "score",
+    "too many detections",
+    "tracked already",
+    "verifier",
+];
+
 /// Rejection funnel: the number of candidates that each test dropped.
 ///
 /// It explains a frame without detections. Every stage writes into it; the entries keep the order

@@ -96,6 +96,26 @@ impl RgbImage {
 }
 
 impl DepthImage {
+    /// Converts millimetres in row order, as depth cameras give them, to metres; 0 and 65535 are "no
+    /// reading". `None` unless there are `width * height`.
+    ///
+    /// ```
+    /// use tagalong_core::DepthImage;
+    /// let depth = DepthImage::from_millimetres(2, 1, &[1500, 0]).expect("two pixels");
+    /// assert_eq!(depth.get(0, 0), Some(1.5));
+    /// assert!(depth.get(1, 0).is_some_and(f32::is_nan));
+    /// ```
+    pub fn from_millimetres(width: usize, height: usize, pixels: &[u16]) -> Option<Self> {
+        let metres = pixels.iter().copied().map(metres_of).collect();
+        Self::from_pixels(width, height, metres)
+    }
+
+    /// Returns true for a depth that was measured: a number above 0.
+    pub fn is_reading(metres: f32) -> bool {
+        // `&` instead of `&&` avoids a branch per reading.
+        (metres > 0.0) & (metres < f32::INFINITY)
+    }
+
     /// Returns the depth of the surface in the middle of a region, m: the median of 5x5 samples in
     /// its central half, of which at least 8 must be readings.
     pub fn surface_m(&self, of: &Rect) -> Option<f64> {
@@ -104,7 +124,7 @@ impl DepthImage {
         // An array instead of a vector saves an allocation per region.
         let mut sorted = [f32::INFINITY; TAPS * TAPS];
         let readings = rows.into_iter().flat_map(|y| self.readings(&columns, y));
-        let readings = readings.filter(|metres| is_reading(*metres));
+        let readings = readings.filter(|metres| Self::is_reading(*metres));
         let mut count = 0;
         for (to, metres) in sorted.iter_mut().zip(readings) {
             *to = metres;
@@ -140,7 +160,7 @@ impl DepthImage {
         let mut readings: Vec<f32> = rows
             // A face on the right of the image starts beyond the row.
             .flat_map(|y| self.row(y).get(left..right).unwrap_or_default().iter().copied())
-            .filter(|metres| metres.is_finite())
+            .filter(|metres| Self::is_reading(*metres))
             .collect();
         // The median ignores the background that shows beside a narrow face.
         readings.sort_by(f32::total_cmp);
@@ -161,9 +181,10 @@ fn taps(from: f64, size: f64) -> [usize; TAPS] {
     std::array::from_fn(|i| (from + size * (2 + i) as f64 / 8.0) as i64 as usize)
 }
 
-fn is_reading(metres: f32) -> bool {
-    // `&` instead of `&&` avoids a branch per reading.
-    (metres > 0.0) & (metres < f32::INFINITY)
+/// Converts millimetres to metres. Cameras write 0 where they measure nothing, and some the largest
+/// number.
+fn metres_of(millimetres: u16) -> f32 {
+    if matches!(millimetres, 0 | u16::MAX) { f32::NAN } else { f32::from(millimetres) * 0.001 }
 }
 
 #[cfg(test)]
@@ -178,6 +199,26 @@ mod tests {
             assert_eq!(depth.face_m(&Rect::new(x, y, 40.0, 40.0)), None, "{x}, {y}");
         }
         assert_eq!(depth.face_m(&Rect::new(0.0, 0.0, 40.0, 40.0)), Some(2.0));
+    }
+
+    #[test]
+    fn a_face_of_zeros_or_infinities_has_no_depth_and_some_of_them_do_not_matter() {
+        let square = Rect::new(0.0, 0.0, 40.0, 40.0);
+        for hole in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+            assert_eq!(DepthImage::filled(40, 40, hole).face_m(&square), None, "{hole}");
+            // Two of three pixels are holes, so that they would be the median.
+            let holed = DepthImage::from_fn(40, 40, |x, _| if x % 3 == 0 { 2.0 } else { hole });
+            assert_eq!(holed.face_m(&square), Some(2.0), "{hole}");
+        }
+    }
+
+    #[test]
+    fn millimetres_become_metres_and_what_cameras_write_for_nothing_is_no_reading() {
+        let depth = DepthImage::from_millimetres(2, 2, &[0, 1, 2345, u16::MAX]).unwrap();
+        let holes: Vec<bool> = depth.pixels().iter().map(|metres| metres.is_nan()).collect();
+        assert_eq!(holes, [true, false, false, true]);
+        assert_eq!(depth.pixels()[1..3], [0.001, 2.345]);
+        assert_eq!(DepthImage::from_millimetres(2, 2, &[1; 3]), None);
     }
 
     /// Collects all readings and sorts them.

@@ -30,6 +30,8 @@ const SHOT_NOISE: f64 = 0.012;
 const LEAST_RETURN: f64 = 0.004;
 /// Steps per pixel of disparity (Khoshelham & Oude Elberink 2012).
 const STEPS_PER_PX: f64 = 8.0;
+/// Standard deviations of the noise of a disparity per step: 1 / 48 pixel at 8 steps per pixel.
+const SIGMAS_PER_STEP: f64 = 6.0;
 /// Columns, and rows, that share a part of the noise of the matcher.
 const PATCH: usize = 4;
 /// Standard deviation of the place that a depth is taken from, pixels (Handa et
@@ -480,7 +482,8 @@ fn measure(row: &mut DepthRow, sensor: &DepthSensor, seed: u64, y: u64) {
         let coarse = coarse[x];
         let fine = 0.75 + 0.5 * uniform_at(seed ^ 0x52, y << 20 | x64);
         let returns = (t >= nearest) & (t <= farthest) & (light > LEAST_RETURN * coarse * fine);
-        let disparity = steps / t + normal_at(seed ^ 0x53, first.wrapping_add(x64)) / 6.0;
+        let disparity =
+            steps / t + normal_at(seed ^ 0x53, first.wrapping_add(x64)) / SIGMAS_PER_STEP;
         let whole = disparity.round();
         let measured = (steps / if whole > 1.0 { whole } else { 1.0 }) as f32;
         *depth_m = if returns { measured } else { f32::NAN };
@@ -634,7 +637,8 @@ mod tests {
                 let coarse = 0.5 + uniform_at(seed ^ 0x51, ((y / 4) << 20) | (x / 4));
                 let fine = 0.75 + 0.5 * uniform_at(seed ^ 0x52, y << 20 | x);
                 let steps = STEPS_PER_PX * SENSOR.focal_px * SENSOR.baseline_m;
-                let disparity = (steps / hit.t + normal_at(seed ^ 0x53, key) / 6.0).round();
+                let noise = normal_at(seed ^ 0x53, key) / SIGMAS_PER_STEP;
+                let disparity = (steps / hit.t + noise).round();
                 let returns = (0.5..=8.0).contains(&hit.t) && light > LEAST_RETURN * coarse * fine;
                 row.push(if returns { (steps / disparity.max(1.0)) as f32 } else { f32::NAN });
                 lit_from.push(x as f64 - SENSOR.focal_px * SENSOR.baseline_m / hit.t);

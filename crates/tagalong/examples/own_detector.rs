@@ -16,9 +16,12 @@ impl Detector for Nearest {
     fn detect(
         &mut self,
         frame: &Frame,
-        _: &Query<'_>,
+        query: &Query<'_>,
         _: &mut Funnel,
     ) -> PluginResult<Vec<Detection>> {
+        if let Query::Track(_) = query {
+            return Ok(Vec::new()); // it does not search near tracks
+        }
         let points = frame.scan()?.points.iter();
         let nearest = points.min_by(|a, b| a.coords.norm().total_cmp(&b.coords.norm()));
         let covariance = Matrix3::from_diagonal_element(0.01);

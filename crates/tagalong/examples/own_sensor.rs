@@ -29,10 +29,13 @@ impl Detector for Swinging {
     fn detect(
         &mut self,
         frame: &Frame,
-        _: &Query<'_>,
+        query: &Query<'_>,
         funnel: &mut Funnel,
     ) -> PluginResult<Vec<Detection>> {
         let mut people = Vec::new();
+        if let Query::Track(_) = query {
+            return Ok(people); // it does not search near tracks
+        }
         for echo in &frame.sensor::<Radar>()?.0 {
             let [x, y] = echo.position;
             // The height of the head is not measured: 1.6 m, with a deviation of 0.3 m.

@@ -110,8 +110,9 @@ impl Moment<'_> {
         self
     }
 
-    /// Adds the depth image: metres along the optical axis, registered to the colour image; NaN is no
-    /// reading.
+    /// Adds the depth image: metres along the optical axis, registered to the colour image. NaN,
+    /// infinity, 0 and negative numbers are no readings. [`DepthImage::from_millimetres`] takes the
+    /// numbers of a camera.
     pub fn depth(mut self, image: impl Into<Arc<DepthImage>>) -> Self {
         self.images.depth = Some(image.into());
         self
@@ -195,7 +196,9 @@ impl Moment<'_> {
         let (motion, has_jumped) = self.maker.motion(self.stamp, self.pose);
         self.maker.count += 1;
         let index = self.index.unwrap_or(self.maker.count);
-        let sensors = self.images.add_to(self.sensors, &self.camera);
+        let mut images = self.images;
+        images.depth = images.depth.map(with_holes);
+        let sensors = images.add_to(self.sensors, &self.camera);
         Ok(Frame::of_sensors(index, self.stamp, self.camera, motion, sensors)
             .with_odometry_age(age_s)
             .with_odometry_jump(has_jumped))
@@ -253,6 +256,19 @@ impl Moment<'_> {
     }
 }
 
+/// Returns a depth image with NaN where there is no reading, which is all that plugins look for: the
+/// caller's may have zeros.
+fn with_holes(depth: Arc<DepthImage>) -> Arc<DepthImage> {
+    fn is_plain(metres: f32) -> bool {
+        metres.is_nan() || DepthImage::is_reading(metres)
+    }
+
+    if depth.pixels().iter().all(|metres| is_plain(*metres)) {
+        return depth;
+    }
+    Arc::new(depth.map(|metres| if is_plain(metres) { metres } else { f32::NAN }))
+}
+
 fn is_distance(value_m: f64) -> bool {
     value_m > 0.0 && value_m.is_finite()
 }
@@ -306,6 +322,20 @@ mod tests {
         let travelled = maker.at(at(3.1)).pose(pose(3.5)).frame().unwrap();
         assert!(!travelled.odometry_jumped);
         assert!((travelled.motion.forward - 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn depths_that_are_no_reading_become_nan_and_other_images_are_not_copied() {
+        let mut maker = maker();
+        let odd = [0.0, -1.0, f32::INFINITY, f32::NAN, 2.5];
+        let depth = DepthImage::from_fn(8, 6, |x, y| odd[(8 * y + x) % 5]);
+        let frame = maker.at(at(1.0)).depth(depth).frame().unwrap();
+        let read: Vec<f32> =
+            frame.depth().unwrap().pixels().iter().copied().filter(|m| !m.is_nan()).collect();
+        assert_eq!(read, [2.5; 9]);
+        let plain = Arc::new(DepthImage::from_fn(8, 6, |x, _| if x == 0 { f32::NAN } else { 2.0 }));
+        let frame = maker.at(at(1.1)).depth(Arc::clone(&plain)).frame().unwrap();
+        assert!(std::ptr::eq(frame.depth().unwrap(), &*plain));
     }
 
     /// Distances of echoes, m.

@@ -19,6 +19,7 @@ pub use tagalong_geometry as geometry;
 pub use tagalong_log as log;
 pub use tagalong_pipeline as pipeline;
 pub use tagalong_tracking as tracking;
+pub use tagalong_vision as vision;
 
 #[cfg(feature = "plugins")]
 pub use pipeline::builtin_registry;

@@ -70,7 +70,7 @@ pub const GUIDES: [Guide; 4] = [
                 to: "}\n",
             },
             Edit::Replace { file: "config.rs", from: "impl Default for Config {", to: "\n}\n" },
-            Edit::Replace { file: "detect.rs", from: "use tagalong_core::{", to: "Config;\n" },
+            Edit::Replace { file: "detect.rs", from: "use tagalong_core::{", to: "LOW_SCORE};\n" },
             Edit::Replace { file: "detect.rs", from: "    config: Config,\n", to: END_OF_FN },
             Edit::Replace {
                 file: "detect.rs",
@@ -78,6 +78,11 @@ pub const GUIDES: [Guide; 4] = [
                 to: END_OF_FN,
             },
             Edit::Replace { file: "detect.rs", from: "    fn detect(", to: END_OF_FN },
+            Edit::Replace {
+                file: "lib.rs",
+                from: "        // Once it finds people",
+                to: "check_all(&registry);\n",
+            },
             Edit::Append { file: "detect.rs" },
         ],
     },

@@ -1,5 +1,5 @@
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
-use tagalong_config::Registry;
+use tagalong_config::{Registry, Remedy};
 use tagalong_core::{
     Capabilities, Detection, Detector, Error, Frame, Funnel, Input, Inputs, Likelihood, Person,
     Query, Result, Track,
@@ -11,6 +11,10 @@ use super::{mood, register_with_fault};
 pub fn register(registry: &mut Registry, name: &'static str) {
     let plugin = move || Heads { fault: name, mood: mood(), remembered: Vec::new() };
     register_with_fault!(registry, detector, name, plugin);
+    if name == "advises-on-others" {
+        const ADVICE: &[Remedy] = &[Remedy { test: "gate", settings: &[], look: "the gate" }];
+        registry.remedies(name, ADVICE);
+    }
 }
 
 /// Detector that takes every cluster of points at head height and before the wall for a head.
@@ -103,8 +107,10 @@ impl Detector for Heads {
         &mut self,
         frame: &Frame,
         query: &Query<'_>,
-        _: &mut Funnel,
+        funnel: &mut Funnel,
     ) -> Result<Vec<Detection>> {
+        let test = if self.fault == "borrows-a-name" { "score" } else { "heads: score" };
+        funnel.drop_many(test, 1);
         assert!(self.fault != "panics" || frame.camera.width > 1, "cannot see");
         if self.fault == "vague" && frame.depth().is_err() {
             return Err(Error::Other("something is missing".into()));

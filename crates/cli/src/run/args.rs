@@ -2,18 +2,30 @@ use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use tagalong_app::choice::CHOICES;
 use tagalong_app::format::Format;
 use tagalong_app::input_args::InputArgs;
+use tagalong_app::installed::NETWORK;
 use tagalong_app::suggest::LOG_ENDINGS;
 use tagalong_log::write::BoxedPart;
 use tagalong_render::OverlayStyle;
 
+/// Returns the help on the pipeline, with the names of those that are taken without one.
+fn config_help() -> String {
+    let built_in = CHOICES.iter().map(|choice| choice.config).filter(|name| *name != NETWORK);
+    let names: Vec<&str> = built_in.collect();
+    format!(
+        "The pipeline, a TOML file or the name of a built-in one: {} and others [default: the one for \
+         what the log has]",
+        names.join(", ")
+    )
+}
+
 /// Arguments of `tagalong run`.
 #[derive(Args, Clone, Debug)]
 pub struct RunArgs {
-    /// The pipeline, a TOML file or the name of a built-in one: depth-verified, depth-ekf,
-    /// depth-net-ekf, stereo-verified, stereo-street, omni-rich, lidar, mono,
-    /// laser-legs, laser-follow [default: the one for what the log has].
+    // The help is made from the list of pipelines, below.
+    #[arg(help = config_help())]
     pub config: Option<PathBuf>,
     /// The log: .mcap, .db3, .bag, or the folder of a recording [default: a short simulated one, written to
     /// runs/sample.mcap].
@@ -180,6 +192,18 @@ mod tests {
         let line = Line::parse_from([&["run"], arguments].concat());
         let config = line.run.config().map(|path| path.display().to_string());
         (config, line.run.log().display().to_string())
+    }
+
+    #[test]
+    fn the_help_names_each_pipeline_that_a_log_may_get() {
+        use clap::CommandFactory as _;
+        let help = Line::command().render_long_help().to_string().replace('\n', " ");
+        for choice in CHOICES.iter().filter(|choice| choice.config != NETWORK) {
+            assert!(help.contains(&format!(" {}", choice.config)), "{}: {help}", choice.config);
+        }
+        let pipeline =
+            help.split("The pipeline,").nth(1).and_then(|rest| rest.split("[default").next());
+        assert_eq!(pipeline.map(|text| text.contains(" network,")), Some(false));
     }
 
     #[test]

@@ -21,7 +21,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("pipeline", &["stereo", "tracking", "following", "network", "vision", "catalog"]),
     ("log", &["vision"]),
     // The library for other programs: it wires the parts and is what they see.
-    ("tagalong", &["pipeline", "log", "tracking"]),
+    ("tagalong", &["pipeline", "log", "tracking", "vision"]),
     ("sim", &[]),
     ("serve", &[]),
     ("eval", &[]),

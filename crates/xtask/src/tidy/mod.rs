@@ -5,6 +5,7 @@ mod arrows;
 mod circles;
 mod closures;
 mod commands;
+mod defaults;
 mod files;
 mod licences;
 mod names;
@@ -18,6 +19,13 @@ use anyhow::{Result, bail};
 use crate::markdown;
 use crate::metadata::Metadata;
 use crate::workspace::Workspace;
+
+/// Prints complaints.
+fn tell(complaints: &[String]) {
+    for complaint in complaints {
+        eprintln!("tidy: {complaint}");
+    }
+}
 
 /// Runs all checks; an error if there is any complaint.
 pub fn tidy(workspace: &Workspace) -> Result<()> {
@@ -35,10 +43,12 @@ pub fn tidy(workspace: &Workspace) -> Result<()> {
     let documents = markdown::documents(workspace)?;
     complaints.extend(paths::check(workspace, &documents));
     complaints.extend(commands::check(workspace, &metadata, &documents)?);
-    complaints.extend(crate::docs::stale(workspace)?);
-    for complaint in &complaints {
-        eprintln!("tidy: {complaint}");
-    }
+    tell(&complaints);
+    // The programs that print parts of documents are built first, which takes minutes in a new clone.
+    eprintln!("tidy: the parts of documents that commands print");
+    let stale = crate::docs::stale(workspace)?;
+    tell(&stale);
+    complaints.extend(stale);
     let stale = crate::docs::stale_tables(workspace)?.len();
     if stale > 0 {
         // No complaint: printing them anew takes hours.

@@ -2,6 +2,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::{Context as _, Result};
 
+use super::defaults;
 use crate::metadata::Metadata;
 use crate::workspace::Workspace;
 
@@ -55,6 +56,13 @@ pub fn check(workspace: &Workspace, metadata: &Metadata) -> Result<Vec<String>> 
         }
     }
     let pages = pages(workspace)?;
+    let settings = workspace.read(LIST)?;
+    for (name, of_plugin) in defaults::of_page(&settings) {
+        if let Some((file, text)) = pages.get(name) {
+            let wrong = defaults::wrong(text, &of_plugin);
+            complaints.extend(wrong.into_iter().map(|wrong| format!("{file} {wrong}")));
+        }
+    }
     for name in registered(workspace)? {
         if !used.contains(&name) && !DEFAULTS.contains(&name.as_str()) {
             complaints.push(format!(
