@@ -126,14 +126,13 @@ fn cell(depth: &DepthImage, column: usize, row: usize) -> u8 {
 fn limit(rules: Rules<'_>, key: &str, wider: fn(f64, f64) -> f64) -> Option<Limit> {
     let detectors = rules.config.get("detectors").and_then(Value::as_array)?;
     let mut widest: Option<Limit> = None;
-    for detector in detectors.iter().filter_map(Value::as_table) {
+    for (at, detector) in detectors.iter().enumerate() {
         let config = detector.get("config").and_then(Value::as_table)?;
         let value = number(config, key)?;
         let is_wider = widest.as_ref().is_none_or(|one| wider(one.value, value) != one.value);
         if is_wider {
             let plugin = detector.get("plugin").and_then(Value::as_str).unwrap_or_default();
-            let line =
-                format!("[[detectors]] plugin = \"{plugin}\", config = {{ {key} = {value:?} }}");
+            let line = format!("detectors.{at}.config.{key} = {value:?} ({plugin})");
             widest = Some(Limit { value, line });
         }
     }

@@ -71,7 +71,7 @@ fn the_last_test_of_a_candidate_of_the_persons_size_is_the_cause() {
     assert_eq!(
         found.text,
         "No track began here: the test \"template cost\" dropped the candidate; decided by \
-         [[detectors]] plugin = \"depth-template\", config = { discover_cost = 0.2 }: larger finds \
+         detectors.0.config.discover_cost = 0.2 (depth-template): larger finds \
          more people and more furniture."
     );
 }
@@ -165,7 +165,7 @@ fn without_a_candidate_the_measured_cause_is_told() {
     assert!(
         far.text.ends_with(
             "the surface there is 6.2 m away, farther than the detectors look; decided by \
-             [[detectors]] plugin = \"depth-template\", config = { max_depth_m = 5.0 }."
+             detectors.0.config.max_depth_m = 5.0 (depth-template)."
         ),
         "{}",
         far.text
