@@ -115,8 +115,9 @@ fn places_on_the_floor_are_truth_beside_a_log() {
     let output = home.bench(&["--logs-dir", "logs", "--configs", "configs/near.toml", "-o", "out"]);
     assert_eq!(code(&output), 0, "{}", text(&output.stderr));
     let said = text(&output.stdout);
-    let floor = said.split_once("on the floor, as the truth has no boxes:").unwrap().1;
-    assert!(floor.contains("long") && !floor.contains("short"), "{said}");
+    let (image, floor) = said.split_once("on the floor, as the truth has no boxes:\n").unwrap();
+    assert!(image.contains(" short ") && !image.contains(" long "), "{said}");
+    assert!(floor.lines().nth(1).unwrap().starts_with("near      long "), "{said}");
     let report = home.report("out");
     let task = &report["tasks"][0];
     assert_eq!((task["log"].as_str(), task["image"].is_null()), (Some("long"), true), "{task}");
@@ -320,7 +321,8 @@ fn a_log_of_scans_alone_is_not_sent_to_annotate() {
         let output = home.bench(&[&["plan", "-o", "out"][..], &arguments].concat());
         let said = text(&output.stderr);
         assert!(said.contains("scans.mcap has no truth"), "{said}");
-        assert!(said.contains("NAME.people-floor.csv") && !said.contains("annotate"), "{said}");
+        assert!(said.contains("give their places as NAME.people-floor.csv"), "{said}");
+        assert!(!said.contains("tagalong annotate"), "{said}");
     }
 }
 
