@@ -52,7 +52,7 @@ pub fn mood() -> f64 {
 macro_rules! register_with_fault {
     ($registry:expr, $kind:ident, $name:expr, $plugin:expr) => {{
         use tagalong_core::Error;
-        let registry = $registry;
+        let registry: &mut Registry = $registry;
         let name = $name;
         let plugin = $plugin;
         let summary = if name == "no-summary" { "" } else { "a test double" };
