@@ -22,7 +22,7 @@ pub const MAX_PLACES: usize = 48;
 
 /// Names of the tests of the tracker and of track managers. A detector gives its tests other names,
 /// as in `"depth-net: peak"`: the settings that decide a test are found by its name.
-pub const TRACKER_TESTS: [&str; 14] = [
+pub const TRACKER_TESTS: [&str; 15] = [
     "associator",
     "association not possible",
     "clutter",
@@ -31,6 +31,7 @@ pub const TRACKER_TESTS: [&str; 14] = [
     "gate",
     "no track fits",
     "no track numbers left",
+    "not the best detection",
     "rather a new person",
     "same person",
     "score",

@@ -142,7 +142,7 @@ Examples:
 ///
 /// # Errors
 /// A folder that is no run, two runs of different logs, a log or a truth that was named and cannot
-/// be used, a page that exists.
+/// be used, a file of the name given with `-o` that exists.
 pub fn view(args: &ViewArgs, registry: &Registry) -> Outcome {
     if let Some(file) = &args.animation {
         return clip::write(args, file);
@@ -154,7 +154,10 @@ pub fn view(args: &ViewArgs, registry: &Registry) -> Outcome {
     let args = ViewArgs { run: rides::run_of(&args.run), ..args.clone() };
     let output = args.output.clone().unwrap_or_else(|| args.run.join(PAGE));
     let runs = args.recordings()?;
-    spare(&output, args.overwrite)?;
+    // The page in the folder of a run is made from that folder, and made anew each time.
+    if args.output.is_some() {
+        spare(&output, args.overwrite)?;
+    }
     let page = Page::of(&runs, &args, &remedies)?;
     write_file(&output, &page.text)?;
     let shown = output.display();

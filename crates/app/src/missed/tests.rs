@@ -180,7 +180,10 @@ fn the_height_of_the_head_is_measured() {
     let rules = Rules { remedies: &remedies(), config: &config() };
     let (name, why) = depths(4.0).cause(&low, rules).expect("a cause");
     assert_eq!(name, "head too low");
-    assert!(why.contains("m above the floor, lower than") && why.contains("= 1.2 }"), "{why}");
+    assert!(
+        why.contains("m above the floor, lower than") && why.contains("= 1.2 (depth-template)"),
+        "{why}"
+    );
     let high = Rect::new(130.0, 0.0, 50.0, 50.0);
     assert_eq!(depths(4.0).cause(&high, rules).map(|cause| cause.0), Some("head too high"));
 }
