@@ -480,10 +480,15 @@ mod tests {
         let other = ("follow-low.toml", "[robot]\nwheel_half_separation_m = 9.0\n");
         for files in [&[][..], &[other, ("robots/another.toml", "")]] {
             for name in ["robots/turtlebot4.toml", "turtlebot4.toml"] {
-                let own = format!("extends = '{name}'\nrobot.max_speed_mps = 0.2\n");
+                let own = format!(
+                    "extends = '{name}'\nrobot.max_speed_mps = 0.2\n\
+                     [collision_monitor]\nsources.0.topic = '/robot1/hazard_detection'\n"
+                );
                 let read = table(&own, files).expect("it is found");
                 let mut expected = built_in.clone();
                 expected["robot"]["max_speed_mps"] = 0.2.into();
+                let sources = &mut expected["collision_monitor"]["sources"];
+                sources[0]["topic"] = "/robot1/hazard_detection".into();
                 assert_eq!(read, expected, "{name}");
             }
         }
