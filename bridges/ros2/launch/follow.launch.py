@@ -6,15 +6,17 @@
 
     ros2 launch tagalong_ros2 follow.launch.py config:=my-robot.toml
 
-With `nav2:=true` its commands go to
-`cmd_vel_nav`, for Nav2's collision monitor or a multiplexer to pass on.
+With `nav2:=true` its commands go to `cmd_vel_nav`, for Nav2's collision monitor or a multiplexer to pass
+on. All other options of the bridge go into `options`, as one text:
+
+    ros2 launch ... options:="--serve=8081 --rmw rmw_cyclonedds_cpp --colour /camera/image_raw"
 """
 
+import shlex
 from pathlib import Path
 
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, ExecuteProcess
-from launch.conditions import IfCondition, UnlessCondition
+from launch.actions import DeclareLaunchArgument, ExecuteProcess, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 
 # This file is share/tagalong_ros2/launch/follow.launch.py where colcon installed it.
@@ -31,27 +33,34 @@ ARGUMENTS = {
     "http": ("127.0.0.1:8080", "address of HTTP with JSON on this computer"),
     "clock": ("system", "system, or arrival for simulated time and replayed bags"),
     "nav2": ("false", "true to let Nav2 pass the commands on"),
+    "options": ("", "further options of the bridge, as in a shell"),
 }
 
+# Arguments that are options of the bridge, by the same names.
+NAMED = ("namespace", "command_type", "http", "clock")
 
-def bridge(condition, *more):
-    words = [LaunchConfiguration("program"), LaunchConfiguration("config")]
-    for name in ("namespace", "command_type", "http", "clock"):
-        words += ["--" + name.replace("_", "-"), LaunchConfiguration(name)]
+
+def command(value):
+    """Returns the words that start the bridge; `value` returns that of an argument."""
+    words = [value("program"), value("config")]
+    for name in NAMED:
+        words += ["--" + name.replace("_", "-"), value(name)]
+    if value("nav2").lower() in ("true", "1"):
+        words += ["--command", "cmd_vel_nav"]
+    return words + shlex.split(value("options"))
+
+
+def bridge(context):
+    def value(name):
+        return LaunchConfiguration(name).perform(context)
+
     # Interrupted with the launch, it tells the wheels to stop.
-    return ExecuteProcess(cmd=words + list(more), output="screen", condition=condition)
+    return [ExecuteProcess(cmd=command(value), output="screen")]
 
 
 def generate_launch_description():
-    nav2 = LaunchConfiguration("nav2")
     arguments = [
         DeclareLaunchArgument(name, default_value=default, description=text)
         for name, (default, text) in ARGUMENTS.items()
     ]
-    return LaunchDescription(
-        arguments
-        + [
-            bridge(UnlessCondition(nav2)),
-            bridge(IfCondition(nav2), "--command", "cmd_vel_nav"),
-        ]
-    )
+    return LaunchDescription(arguments + [OpaqueFunction(function=bridge)])

@@ -148,6 +148,9 @@ pub struct Options {
     pub lifecycle: bool,
 }
 
+/// The variable that names a Discovery Server of Fast DDS.
+const DISCOVERY_SERVER: &str = "ROS_DISCOVERY_SERVER";
+
 /// Type of the command messages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum CommandType {
@@ -203,6 +206,7 @@ impl Options {
     /// [`BridgeError::Config`], with file, line and remedy.
     pub(crate) fn setup(&self, registry: &Registry) -> Result<Setup, BridgeError> {
         check_security(|name| std::env::var(name).ok())?;
+        check_discovery(|name| std::env::var(name).ok())?;
         let pipeline = Pipeline::builder(registry).from_toml_file(&self.config)?;
         let LogSettings { input, limits, .. } = LogSettings::of(&pipeline)?;
         if self.follow_object.is_some() && !pipeline.has_controller() {
@@ -245,9 +249,44 @@ fn check_security(variable: impl Fn(&str) -> Option<String>) -> Result<(), Bridg
     Ok(())
 }
 
+/// Refuses to start where nodes find each other through a Discovery Server of Fast DDS: this node does
+/// not ask one, and would see no topic.
+fn check_discovery(variable: impl Fn(&str) -> Option<String>) -> Result<(), BridgeError> {
+    let server = variable(DISCOVERY_SERVER).unwrap_or_default();
+    if server.is_empty() {
+        return Ok(());
+    }
+    let words = format!(
+        "{DISCOVERY_SERVER} is `{server}`, and this program knows Simple Discovery alone: it would see no \
+         topic. Set the robot to Simple Discovery (on a TurtleBot 4 in `turtlebot4-setup`), restart its \
+         nodes, and unset {DISCOVERY_SERVER} for this program"
+    );
+    Err(BridgeError::Config(words))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_node_starts_where_others_are_found_through_a_server_that_it_does_not_ask() {
+        for (server, may_start) in [
+            (Some("192.168.186.2:11811"), false),
+            (Some(";10.0.0.1:11811"), false),
+            (Some(""), true),
+            (None, true),
+        ] {
+            let checked = check_discovery(|name| {
+                server.filter(|_| name == "ROS_DISCOVERY_SERVER").map(str::to_owned)
+            });
+            assert_eq!(checked.is_ok(), may_start, "{server:?}");
+            if let (Some(server), Err(error)) = (server, checked) {
+                assert_eq!(error.exit_code(), 2);
+                let words = error.to_string();
+                assert!(words.contains(server) && words.contains("Simple Discovery"), "{words}");
+            }
+        }
+    }
 
     #[test]
     fn no_node_without_security_starts_where_security_is_enforced() {

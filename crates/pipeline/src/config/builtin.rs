@@ -54,6 +54,9 @@ const BUILT_IN: &[(&str, &str)] = configs! {
 /// Configs of the folder that are not built in, because they run the network of a file.
 pub(super) const OF_A_FILE: [&str; 3] = ["colour-net", "depth-network", "onnx"];
 
+/// Folder of the configs of robots.
+const ROBOTS_FOLDER: &str = "robots/";
+
 /// Configs of robots, by the names of their files.
 const ROBOTS: &[(&str, &str)] = &[
     ("turtlebot3", include_str!("../../configs/robots/turtlebot3.toml")),
@@ -78,11 +81,29 @@ pub(super) fn builtin_text(name: &str) -> Option<String> {
     Some(whole.unwrap_or_else(|_| text.to_owned()))
 }
 
+/// Returns the text of a built-in config; those of robots may have the name of their folder before
+/// their own.
 fn text_alone(name: &str) -> Option<&'static str> {
-    all().find(|(builtin, _)| *builtin == name).map(|(_, text)| *text)
+    match name.strip_prefix(ROBOTS_FOLDER) {
+        Some(robot) => text_among(ROBOTS.iter(), robot),
+        None => text_among(all(), name),
+    }
 }
 
-/// Returns the text of a config that another one extends: it is built in, too.
+fn text_among<'a>(
+    mut configs: impl Iterator<Item = &'a (&'static str, &'static str)>,
+    name: &str,
+) -> Option<&'static str> {
+    configs.find(|(builtin, _)| *builtin == name).map(|(_, text)| *text)
+}
+
+/// Returns the text of the built-in config that has the name of a file: `NAME.toml`, or
+/// `robots/NAME.toml`.
+pub(super) fn text_of_file(file: &str) -> Option<&'static str> {
+    text_alone(file.strip_suffix(".toml")?)
+}
+
+/// Returns the text of a config that a built-in one extends: it is built in, too.
 pub(super) fn read_base(path: &Path) -> io::Result<String> {
     let stem = path.file_stem().map(|stem| stem.to_string_lossy());
     let base = stem.and_then(|stem| text_alone(&stem));
@@ -110,6 +131,13 @@ mod tests {
         }
         left_out.sort();
         assert_eq!(left_out, OF_A_FILE);
+    }
+
+    #[test]
+    fn robots_have_their_folder_before_their_name_and_others_do_not() {
+        assert_eq!(builtin_text("robots/turtlebot4"), builtin_text("turtlebot4"));
+        assert_eq!(builtin_text("robots/follow-low"), None);
+        assert_eq!(text_of_file("robots/turtlebot4"), None);
     }
 
     #[test]

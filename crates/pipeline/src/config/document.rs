@@ -42,6 +42,8 @@ struct Base {
     /// The text behind as much space as the texts before it take.
     padded: String,
     start: usize,
+    /// Part of the program, and so are the configs that it extends: no file stands for them.
+    is_builtin: bool,
 }
 
 impl Base {
@@ -95,7 +97,8 @@ impl Document {
             table.remove(EXTENDS);
             // A list of values to try belongs to the file that was written for the trial.
             table.remove(tune::TABLE);
-            let mut table = anchor_paths(table, base.folder());
+            let mut table =
+                if base.is_builtin { table } else { anchor_paths(table, base.folder()) };
             inherit(&mut table, inherited).map_err(|error| self.locate(error))?;
             inherited = table;
         }
@@ -239,13 +242,36 @@ fn base_at(
             "cannot extend {shown}: a config is a file whose name ends in .{ENDING}{remedy}"
         ));
     }
-    let text = read_base(&path).or_else(|error| builtin_base(name, error));
-    let text = text.map_err(|error| {
+    let of_builtin = before.last().is_some_and(|base| base.is_builtin);
+    let found = if of_builtin {
+        builtin::read_base(&path).map(|text| (text, true))
+    } else {
+        file_or_builtin(&path, name, read_base)
+    };
+    let (text, is_builtin) = found.map_err(|error| {
         let hint =
             if error.kind() == io::ErrorKind::NotFound { hint(&path) } else { String::new() };
         format!("cannot extend {}: {error}{hint}", path.display())
     })?;
-    Ok(Base { path, padded: "\n".repeat(start) + &text, start })
+    Ok(Base { path, padded: "\n".repeat(start) + &text, start, is_builtin })
+}
+
+/// Returns the text of a config, and whether it is built in. A file stands before a built-in config,
+/// which is looked up by its name where there is none: a program that was installed comes without the
+/// folder of its configs.
+fn file_or_builtin(
+    path: &Path,
+    name: &str,
+    read_base: &ReadBase<'_>,
+) -> io::Result<(String, bool)> {
+    let error = match read_base(path) {
+        Ok(text) => return Ok((text, false)),
+        Err(error) => error,
+    };
+    if error.kind() != io::ErrorKind::NotFound {
+        return Err(error);
+    }
+    builtin::text_of_file(name).map(|text| (text.to_owned(), true)).ok_or(error)
 }
 
 /// Returns "; did you mean `NAME.toml`?" for a base that is missing, with the nearest config of its
@@ -272,15 +298,6 @@ fn is_config(path: &Path) -> bool {
     // A link does not lend its name to another file.
     let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     [path, &real].iter().all(|path| path.extension().is_some_and(|ending| ending == ENDING))
-}
-
-/// Returns the text of a built-in config of a plain name, where there is no such file: a program that
-/// was installed comes without the folder of its configs.
-fn builtin_base(name: &str, error: io::Error) -> io::Result<String> {
-    if error.kind() != io::ErrorKind::NotFound || name.contains(['/', '\\']) {
-        return Err(error);
-    }
-    builtin::read_base(Path::new(name)).map_err(|_| error)
 }
 
 /// Adds the keys that a table lacks. A list replaces the inherited one; a table of its indices
@@ -456,6 +473,44 @@ mod tests {
     }
 
     #[test]
+    fn a_built_in_robot_is_extended_from_any_folder_with_all_that_it_extends() {
+        let built_in: toml::Table =
+            builtin::builtin_text("turtlebot4").expect("built in").parse().expect("TOML");
+        // A file with the name of a config that the built-in one extends does not get between them.
+        let other = ("follow-low.toml", "[robot]\nwheel_half_separation_m = 9.0\n");
+        for files in [&[][..], &[other, ("robots/another.toml", "")]] {
+            for name in ["robots/turtlebot4.toml", "turtlebot4.toml"] {
+                let own = format!(
+                    "extends = '{name}'\nrobot.max_speed_mps = 0.2\n\
+                     [collision_monitor]\nsources.0.topic = '/robot1/hazard_detection'\n"
+                );
+                let read = table(&own, files).expect("it is found");
+                let mut expected = built_in.clone();
+                expected["robot"]["max_speed_mps"] = 0.2.into();
+                let sources = &mut expected["collision_monitor"]["sources"];
+                sources[0]["topic"] = "/robot1/hazard_detection".into();
+                assert_eq!(read, expected, "{name}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_file_of_the_robot_stands_before_the_built_in_one() {
+        let files =
+            [("robots/turtlebot4.toml", "extends = '../near.toml'\n"), ("near.toml", "a = 1\n")];
+        let read = table("extends = 'robots/turtlebot4.toml'\n", &files).expect("both are files");
+        assert_eq!(read.get("a").and_then(toml::Value::as_integer), Some(1));
+        assert_eq!(read.len(), 1);
+    }
+
+    #[test]
+    fn names_in_a_built_in_base_are_no_files() {
+        let files = [("clear-follow", "a file that is called like a plugin")];
+        let read = table("extends = 'follow-depth.toml'\n", &files).expect("it is built in");
+        assert_eq!(read["controller"]["plugin"].as_str(), Some("clear-follow"));
+    }
+
+    #[test]
     fn mistakes_of_a_base_are_shown_there() {
         let shown = table("extends = 'base.toml'\n", &[("base.toml", "a = 1\nb = \n")]);
         let shown = shown.unwrap_err();
@@ -503,6 +558,10 @@ mod tests {
         // A plain name without a file is that of a built-in config.
         let builtin = table("extends = 'mono.toml'\n", &[]).unwrap();
         assert!(builtin.contains_key("filter"), "{builtin:?}");
+        let robot = table("extends = 'robots/turtlebot.toml'\n", &[]).unwrap_err();
+        assert!(robot.contains("; did you mean `turtlebot"), "{robot}");
+        let elsewhere = table("extends = 'robots/follow-low.toml'\n", &[]).unwrap_err();
+        assert!(elsewhere.contains("; did you mean `follow-low.toml`?"), "{elsewhere}");
         let circle = [("b.toml", "extends = 'b.toml'\n")];
         let circle = table("extends = 'b.toml'\n", &circle).unwrap_err();
         assert!(circle.contains("b.toml:1:11: `extends` goes on in a circle"), "{circle}");

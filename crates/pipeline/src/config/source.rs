@@ -239,6 +239,9 @@ mod tests {
             assert_eq!(source.stem(), "depth-ekf");
             assert_eq!(source.path(), Path::new("configs/depth-ekf.toml"));
         }
+        let robot = ConfigSource::builtin("configs/robots/turtlebot4.toml").unwrap();
+        assert_eq!(robot.path(), Path::new("configs/robots/turtlebot4.toml"));
+        assert_eq!(robot.text(), ConfigSource::builtin("turtlebot4").unwrap().text());
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("own.toml");
         fs::write(&path, "seed = 3\n").unwrap();
