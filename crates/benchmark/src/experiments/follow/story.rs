@@ -71,7 +71,7 @@ mod tests {
                 clearance,
                 crowd: None,
                 approach: None,
-                reason: None,
+                reason: None, is_still: false,
             }],
             in_view: Vec::new(),
             faults: scene.scheduled_faults(),
