@@ -77,6 +77,10 @@ pub struct DriveNote {
     pub reason: String,
     /// Meaning of the reason, in a sentence.
     pub reason_about: String,
+    /// The person, the place or the sensor that is the cause, with its distance against its limit;
+    /// empty where there is none.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub cause: String,
     /// Commanded speed, m/s.
     pub forward_mps: f64,
     /// Commanded rate of turn, to the left, rad/s.
@@ -178,6 +182,7 @@ impl DriveNote {
     fn of(report: &FrameReport, odom_from_robot: &Isometry2<f64>) -> Option<Self> {
         let lock = report.lock.as_ref()?;
         let command = report.command?;
+        let twist = command.told_twist();
         Some(Self {
             lock: lock.state.name().to_owned(),
             lock_about: lock.state.about().to_owned(),
@@ -185,10 +190,11 @@ impl DriveNote {
             since_s: rounded(lock.since_s, 1e2),
             belief: lock.belief.map(|belief| rounded(belief, 1e3)),
             reason: command.reason.name().to_owned(),
-            reason_about: command.reason.about().to_owned(),
-            forward_mps: rounded(command.twist.linear_mps, 1e3),
-            turn_rps: rounded(command.twist.angular_rps, 1e3),
-            motion: command.reason.effect().to_owned(),
+            reason_about: command.about(),
+            cause: report.cause.as_ref().map(ToString::to_string).unwrap_or_default(),
+            forward_mps: rounded(twist.linear_mps, 1e3),
+            turn_rps: rounded(twist.angular_rps, 1e3),
+            motion: command.effect().to_owned(),
             things_cm: cells_cm(&report.obstacles, false, odom_from_robot),
             movers_cm: cells_cm(&report.obstacles, true, odom_from_robot),
         })

@@ -2,6 +2,11 @@ use std::fmt;
 
 use crate::{DiffDrive, Frame, Inputs, Stamp, Track, Twist, WheelSpeeds};
 
+/// Speed, m/s or rad/s, that two digits show as zero.
+const STILL: f64 = 0.005;
+/// Speed, m/s, up to which the ramp to rest may pass zero for the next command.
+const SWING_MPS: f64 = 0.02;
+
 /// Velocity to drive, with a period of validity and a reason.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
@@ -29,6 +34,41 @@ impl Command {
         reason: Reason,
     ) -> Self {
         Self { twist, wheels, stamp, valid_until, reason }
+    }
+
+    /// Returns the velocity as pages tell it: without what two digits round away, and without the
+    /// step below zero of a robot that only brakes.
+    pub fn told_twist(&self) -> Twist {
+        let Twist { linear_mps, lateral_mps, angular_rps } = self.twist;
+        let is_still = linear_mps < STILL && linear_mps > -SWING_MPS;
+        let linear_mps = if is_still { 0.0 } else { linear_mps };
+        let lateral_mps = if lateral_mps.abs() < STILL { 0.0 } else { lateral_mps };
+        let angular_rps = if angular_rps.abs() < STILL { 0.0 } else { angular_rps };
+        Twist { linear_mps, lateral_mps, angular_rps }
+    }
+
+    /// Returns the effect in one word, as [`Reason::effect`]; a robot that neither drives nor turns
+    /// stands, whatever the reason.
+    pub fn effect(&self) -> &'static str {
+        if self.told_twist() == Twist::STOP { "stands" } else { self.reason.effect() }
+    }
+
+    /// Returns one sentence for a person who watches the robot: [`Reason::about`], with what the robot
+    /// does by this command.
+    pub fn about(&self) -> String {
+        let about = self.reason.about();
+        let is_still = self.told_twist() == Twist::STOP;
+        if is_still && self.reason == Reason::Follow {
+            return "stands, as the controller asks".to_owned();
+        }
+        if is_still && self.reason.moves() {
+            let cause = about.split_once(": ").map_or(about, |(_, cause)| cause);
+            return format!("stands: {cause}");
+        }
+        match about.strip_prefix("stands: ") {
+            Some(cause) if !is_still => format!("does not drive, may turn: {cause}"),
+            _ => about.to_owned(),
+        }
     }
 }
 
@@ -305,6 +345,43 @@ mod tests {
         for reason in ALL {
             assert_eq!(reason.effect() == "stands", !reason.moves(), "{reason}");
         }
+    }
+
+    fn command(linear_mps: f64, angular_rps: f64, reason: Reason) -> Command {
+        let wheels = WheelSpeeds::STOP;
+        let at = Stamp::default();
+        Command::new(Twist::new(linear_mps, angular_rps), wheels, at, at, reason)
+    }
+
+    #[test]
+    fn a_command_of_zero_stands_whatever_its_reason() {
+        for reason in ALL {
+            let still = command(0.004, -0.004, reason);
+            assert_eq!(still.effect(), "stands", "{reason}");
+            assert!(still.about().starts_with("stands"), "{}", still.about());
+        }
+        let near = command(0.0, 0.0, Reason::Near).about();
+        assert_eq!(near, "stands: a person, or something that moves, is near");
+        assert_eq!(command(0.1, 0.0, Reason::Near).effect(), "slower");
+        assert_eq!(command(0.0, 0.1, Reason::Near).effect(), "slower");
+        assert_eq!(command(0.1, 0.0, Reason::Near).about(), Reason::Near.about());
+    }
+
+    #[test]
+    fn a_robot_that_turns_is_not_said_to_stand() {
+        for reason in ALL {
+            let turns = command(0.0, 0.46, reason).about();
+            assert!(!turns.starts_with("stands"), "{turns}");
+        }
+        let close = command(0.0, -0.46, Reason::TooClose).about();
+        assert!(close.starts_with("does not drive, may turn: a person"), "{close}");
+    }
+
+    #[test]
+    fn a_robot_that_only_brakes_has_no_negative_speed() {
+        assert_eq!(command(-0.015, 0.0, Reason::Near).told_twist(), Twist::STOP);
+        assert_eq!(command(-0.1, 0.0, Reason::Follow).told_twist().linear_mps, -0.1);
+        assert_eq!(command(0.015, 0.0, Reason::Near).told_twist().linear_mps, 0.015);
     }
 
     #[test]

@@ -21,6 +21,7 @@
 //!   command.
 //! * This is no safety function in the sense of the standards.
 
+mod cause;
 mod collision_monitor;
 mod command_limiter;
 mod distances;
@@ -31,6 +32,7 @@ mod skill;
 mod steering;
 mod target_lock;
 
+pub use cause::{Cause, PlaceCause};
 pub use collision_monitor::{
     CollisionMonitorSettings, NoReturn, ObstaclePoint, ObstacleSource, SourceKind, SourceSettings,
 };

@@ -1,3 +1,4 @@
+use std::cell::RefCell;
 use std::sync::Arc;
 
 use tagalong_core::{
@@ -12,7 +13,7 @@ use crate::command_limiter::{Aim, CommandLimiter, Wish};
 use crate::skill::{View, before_any_frame};
 use crate::target_lock::{Search, TargetLock};
 use crate::{
-    Base, ChoiceRule, Enrollment, EnrollmentError, FollowSettings, FollowStatus, LockReport,
+    Base, Cause, ChoiceRule, Enrollment, EnrollmentError, FollowSettings, FollowStatus, LockReport,
     LockState, ObstaclePoint, Orders, RobotSettings, SearchSettings, TargetSettings,
 };
 
@@ -35,6 +36,8 @@ pub struct Steering {
     robot: RobotSettings,
     fresh: u32,
     last: Option<Stamp>,
+    /// Time since which a sensor is frozen.
+    frozen_since: Option<Stamp>,
 }
 
 /// Result of one frame.
@@ -45,6 +48,8 @@ pub struct Steered {
     pub target: Option<TrackId>,
     /// The state of the target lock.
     pub lock: LockReport,
+    /// Cause of the reason of the command, where a place or a frozen sensor is one.
+    pub cause: Option<Cause>,
     /// Places that the collision monitor counted.
     pub obstacles: Vec<ObstaclePoint>,
 }
@@ -77,6 +82,7 @@ impl Steering {
             robot,
             fresh: FRESH_FRAMES,
             last: None,
+            frozen_since: None,
         }
     }
 
@@ -193,18 +199,39 @@ impl Steering {
             pause_s: self.last.map_or(0.0, |last| frame.stamp.seconds_since(last)),
         };
         self.last = Some(frame.stamp);
-        let command = self
-            .limiter
-            .limit(&wish, |path, speed, braking| self.monitor.allowance(path, speed, braking));
+        // What is allowed is noted, to name the cause of the command.
+        let asked = RefCell::new(Vec::new());
+        let command = self.limiter.limit(&wish, |path, speed, braking| {
+            let allowed = self.monitor.allowance(path, speed, braking);
+            asked.borrow_mut().push(allowed);
+            allowed
+        });
+        let cause = Cause::of(command.reason, &asked.into_inner(), &self.monitor, tracks);
         // The search learns only now that its wish was blocked; it reacts in the next frame.
         let is_blocked =
             matches!(command.reason, Reason::Blocked | Reason::TooClose | Reason::Unknown);
         self.search.add_block(is_blocked, motion.dt);
         let target = target.map(|track| track.id);
         let view = View::new(tracks, &frame.camera, frame.stamp);
+        let lock = self.lock_by_sensors(lock, cause.as_ref(), frame.stamp);
         self.status = view.status(&lock, target, command.reason.name(), self.fault());
         self.view = Some(view);
-        Ok(Steered { command, target, lock, obstacles: self.monitor.obstacles() })
+        Ok(Steered { command, target, lock, cause, obstacles: self.monitor.obstacles() })
+    }
+
+    /// Returns the report of the lock as the sensors let it be believed.
+    fn lock_by_sensors(
+        &mut self,
+        lock: LockReport,
+        cause: Option<&Cause>,
+        now: Stamp,
+    ) -> LockReport {
+        let Some(Cause::Sensor { needs_reset, .. }) = cause else {
+            self.frozen_since = None;
+            return lock;
+        };
+        let since = *self.frozen_since.get_or_insert(now);
+        lock.of_frozen_sensor(*needs_reset, now.seconds_since(since))
     }
 
     fn ask(

@@ -109,10 +109,10 @@ pub use report::FrameReport;
 pub use settings::{PipelineSettings, PluginSettings};
 pub use sources::{MissingSource, Sources};
 pub use tagalong_following::{
-    Base, BlindZone, Choice, ChoiceRule, CollisionMonitorSettings, CommandLimiterSettings,
+    Base, BlindZone, Cause, Choice, ChoiceRule, CollisionMonitorSettings, CommandLimiterSettings,
     Differences, Enable, EnableSwitch, Enrollment, EnrollmentError, FollowSettings, FollowStatus,
     Likeness, LockReport, LockState, LooksSettings, ObstaclePoint, ObstacleSource, OdometrySource,
-    Orders, Permission, RobotSettings, SafetyDistances, SearchSettings, SourceKind, SourceSettings,
+    Orders, Permission, PlaceCause, RobotSettings, SafetyDistances, SearchSettings, SourceKind, SourceSettings,
     TargetSettings,
 };
 pub use tagalong_stereo::StereoSettings;

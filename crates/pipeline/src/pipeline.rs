@@ -269,13 +269,14 @@ impl Pipeline {
         if matches!(report.outcome, Outcome::ResetBackward { .. } | Outcome::ResetForward { .. }) {
             steering.reset();
         }
-        let Steered { command, target, lock, obstacles } =
+        let Steered { command, target, lock, cause, obstacles } =
             steering.steer(frame, &report.motion, &report.tracks, &report.joints())?;
         let not_finite = u64::from(command.reason == Reason::NotFinite);
         report.funnel.drop_many("command not finite", not_finite);
         report.target = target;
         report.lock = Some(lock);
         report.command = Some(command);
+        report.cause = cause;
         report.obstacles = obstacles;
         Ok(())
     }

@@ -5,7 +5,7 @@ use tagalong_tracking::{
     Candidate, IdentityCorrection, IdentityDoubt, Outcome, TrackingReport, Weighing, joints_of,
 };
 
-use crate::{LockReport, ObstaclePoint};
+use crate::{Cause, LockReport, ObstaclePoint};
 
 /// Result of one frame: the [`TrackingReport`] and, where the pipeline has a controller, the target
 /// and the command.
@@ -35,6 +35,8 @@ pub struct FrameReport {
     /// Command for the wheels with its reason, where the pipeline has a controller: its wish within
     /// all limits, zero without a target.
     pub command: Option<Command>,
+    /// Cause of the command's reason, where a place or a frozen sensor is one.
+    pub cause: Option<Cause>,
     /// Places that the collision monitor counts as obstacles, where the pipeline has a controller;
     /// those of the followed person are left out.
     pub obstacles: Vec<ObstaclePoint>,
@@ -88,6 +90,7 @@ impl From<TrackingReport> for FrameReport {
             target: None,
             lock: None,
             command: None,
+            cause: None,
             obstacles: Vec::new(),
             nis,
             weighing,

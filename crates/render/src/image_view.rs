@@ -88,7 +88,8 @@ pub fn add_labels(labels: &mut Labels, scene: &OverlayData, by: usize, style: Ov
             continue;
         }
         let region = scaled(&region, by as f64);
-        labels.add(&region, name_of(track), lettering, colour(track));
+        let name = name_of(track, scene.report.target == Some(track.id));
+        labels.add(&region, name, lettering, colour(track));
     }
     for (region, test) in dropped(scene).into_iter().filter(|_| style.is_debug()) {
         labels.add_if_room(&scaled(&region, by as f64), test, Lettering::Small, DROPPED.faint(1.0));
@@ -251,13 +252,14 @@ fn dropped(scene: &OverlayData) -> Vec<(Rect, String)> {
     all
 }
 
-/// Returns the number of a track, its state, and its distance from the robot.
-fn name_of(track: &Track) -> String {
+/// Returns the number of a track, whether it is the target, its state, and its distance from the robot.
+fn name_of(track: &Track, is_target: bool) -> String {
+    let target = if is_target { " target" } else { "" };
     let state = match (track.confirmed, track.seen) {
         (false, _) => "?",
         (true, true) => "",
         (true, false) => " predicted",
     };
     let distance = track.estimate.person.position.xy().coords.norm();
-    format!("{}{state} {distance:.1} m", track.id)
+    format!("{}{target}{state} {distance:.1} m", track.id)
 }

@@ -1,5 +1,6 @@
 use nalgebra::Point2;
 use tagalong_geometry::Rect;
+use tagalong_pipeline::FrameReport;
 use tagalong_vision::Sketch;
 
 use super::canvas::{Canvas, Ink, LINE_PX, Lettering};
@@ -50,16 +51,37 @@ pub fn draw(
 }
 
 fn title(scene: &OverlayData, trails: &Trails, style: OverlayStyle) -> String {
-    let people = scene.report.tracks.iter().filter(|t| t.confirmed && t.seen).count();
-    let people = if people == 1 { "1 person".to_owned() } else { format!("{people} people") };
+    let people = seen(scene);
+    let drive = drive(&scene.report);
     if !style.is_debug() {
         let elapsed_s = trails.elapsed_s(scene.report.stamp);
-        return format!("{elapsed_s:.1} s   {people} seen   frame {}", scene.report.index);
+        return format!("{elapsed_s:.1} s   {people}   frame {}{drive}", scene.report.index);
     }
     let ms = scene.report.stamp.nanos() / 1_000_000;
     let s = ms / 1000;
     let ms = ms % 1000;
-    format!("frame {}   {s}.{ms:03} s   {people} seen", scene.report.index)
+    format!("frame {}   {s}.{ms:03} s   {people}{drive}", scene.report.index)
+}
+
+/// Returns the number of people that are seen; a frame that came too late has none.
+fn seen(scene: &OverlayData) -> String {
+    if !scene.report.outcome.is_processed() {
+        return "late, not used".to_owned();
+    }
+    match scene.report.tracks.iter().filter(|t| t.confirmed && t.seen).count() {
+        1 => "1 person seen".to_owned(),
+        people => format!("{people} people seen"),
+    }
+}
+
+/// Returns the target, the command and its reason, where the pipeline has a controller.
+fn drive(report: &FrameReport) -> String {
+    let Some(command) = report.command else { return String::new() };
+    let target = report.target.map_or("no target".to_owned(), |id| format!("target {id}"));
+    let twist = command.told_twist();
+    let speed = twist.linear_mps;
+    let turn = twist.angular_rps;
+    format!("   {target}   {speed:.2} m/s {turn:+.2} rad/s: {}", command.reason)
 }
 
 /// Line or mark in the picture.

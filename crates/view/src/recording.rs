@@ -120,6 +120,18 @@ pub struct RideFacts {
     pub clearance_things_m: Option<f64>,
     /// Time of the least room, s.
     pub nearest_s: Option<f64>,
+    /// Times without the person after the first with them.
+    pub episodes: Vec<EpisodeFacts>,
+}
+
+/// Time of a ride without the person.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default)]
+pub struct EpisodeFacts {
+    /// Since when, s.
+    pub lost_s: f64,
+    /// When the person was followed again, s.
+    pub found_s: Option<f64>,
 }
 
 impl RideFacts {
@@ -138,6 +150,24 @@ impl RideFacts {
         (self.slow_s > 0.0).then(|| self.distance_kept_s / self.slow_s)
     }
 
+    /// Returns the time from which on nobody was followed until the end, s.
+    pub fn lost_to_the_end_s(&self) -> Option<f64> {
+        self.episodes.last().filter(|it| it.found_s.is_none()).map(|it| it.lost_s)
+    }
+
+    /// Returns whether the person was kept, in words: a ride that ends without the person says so, also
+    /// where nothing better was possible.
+    pub fn kept_in_words(&self) -> String {
+        match (self.kept, self.lost_to_the_end_s()) {
+            (true, None) => "the person was kept".to_owned(),
+            (true, Some(lost_s)) => format!(
+                "the person was lost at {lost_s:.1} s and not seen for long enough to be found again"
+            ),
+            (false, None) => "the person was not kept".to_owned(),
+            (false, Some(lost_s)) => format!("the person was not kept: lost from {lost_s:.1} s on"),
+        }
+    }
+
     /// Returns the result in one line.
     pub fn summary(&self) -> String {
         fn metres(room: Option<f64>) -> String {
@@ -151,7 +181,7 @@ impl RideFacts {
             "{}{stands}{}; least room to people {}, to things {}; distance kept for {share} of the time in \
              which the person was followed and walked slowly; the lock was on another person or a thing for \
              {:.1} s",
-            if self.kept { "the person was kept" } else { "the person was not kept" },
+            self.kept_in_words(),
             if self.touches() { "; the robot touched something" } else { "" },
             metres(self.clearance_people_m),
             metres(self.clearance_things_m),

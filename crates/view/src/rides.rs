@@ -248,10 +248,15 @@ fn table(rides: &[Ride], from: Option<&Path>) -> Markup {
 
 /// Returns whether the person was kept, and the reason of a robot that never moved.
 fn kept(ride: &RideFacts) -> String {
-    let answer = if ride.kept { "yes" } else { "no" };
+    let lost = ride.lost_to_the_end_s().map_or(String::new(), |at_s| format!(", lost at {at_s:.1} s"));
+    let answer = match (ride.kept, lost.is_empty()) {
+        (true, true) => "yes".to_owned(),
+        (true, false) => format!("as far as possible{lost}"),
+        (false, _) => format!("no{lost}"),
+    };
     match &ride.never_moved {
         Some(why) => format!("{answer}; the robot never moved ({why})"),
-        None => answer.into(),
+        None => answer,
     }
 }
 
@@ -316,6 +321,20 @@ mod tests {
         let summary = rides[1].facts.summary();
         assert!(summary.contains("the robot never moved (silent)"), "{summary}");
         assert!(summary.contains("the lock was on another person or a thing for"), "{summary}");
+    }
+
+    #[test]
+    fn a_ride_that_ends_without_the_person_says_so() {
+        let mut facts = RideFacts { kept: true, ..RideFacts::default() };
+        assert_eq!(kept(&facts), "yes");
+        assert!(facts.summary().starts_with("the person was kept;"), "{}", facts.summary());
+        facts.episodes =
+            serde_json::from_str(r#"[{"lost_s":2.0,"found_s":3.0},{"lost_s":8.94,"found_s":null}]"#)
+                .unwrap();
+        assert_eq!(kept(&facts), "as far as possible, lost at 8.9 s");
+        assert!(!facts.summary().contains("was kept"), "{}", facts.summary());
+        facts.kept = false;
+        assert_eq!(kept(&facts), "no, lost at 8.9 s");
     }
 
     #[test]

@@ -188,6 +188,7 @@ mod tests {
                 crowd: Some(view),
                 approach: None,
                 reason: None,
+                is_still: false,
             });
         }
         ticks

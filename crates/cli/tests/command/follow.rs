@@ -45,7 +45,7 @@ fn the_text_tells_why_the_robot_stood_or_drove_slower() {
     let output = follow(folder.path(), "follow-depth.toml", &["--set", "camera.height_m=0.6"]);
     let told = text(&output.stdout);
     let line = told.lines().find(|line| line.starts_with("  walk: follow-depth, seed ")).unwrap();
-    assert!(line.contains("stands ") && line.contains(" %"), "{line}");
+    assert!(line.contains("does not drive ") && line.contains(" %"), "{line}");
     let said = text(&output.stderr);
     assert_eq!(
         said.matches("is by its [suits] not made for walk (the camera").count(),

@@ -38,6 +38,11 @@ impl FurtherSource {
         Self { settings, freshness: Freshness::default(), state }
     }
 
+    /// Returns its name in reports.
+    pub(super) fn name(&self) -> &str {
+        &self.settings.name
+    }
+
     /// Forgets all places, but neither that the source once delivered nor that it was frozen.
     pub(super) fn clear(&mut self) {
         match &mut self.state {

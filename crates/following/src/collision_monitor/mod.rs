@@ -259,6 +259,34 @@ impl CollisionMonitor {
         self.zones.stop_reason()
     }
 
+    /// Returns the first sensor that is frozen, by name, and true if that lasts until the robot is armed
+    /// again.
+    pub(crate) fn frozen_sensor(&self) -> Option<(String, bool)> {
+        let most = self.identical_frames();
+        // What only repeats itself is free again with the next reading.
+        if self.depth.is_frozen(most) {
+            return Some(("the depth image".to_owned(), self.depth.is_frozen(0)));
+        }
+        if self.laser.is_frozen(most) {
+            return Some(("the laser scanner".to_owned(), self.laser.is_frozen(0)));
+        }
+        for (place, (laser, _)) in self.further_lasers.iter().enumerate() {
+            if laser.is_frozen(most) {
+                return Some((format!("laser scanner {}", place + 2), laser.is_frozen(0)));
+            }
+        }
+        let source = self.sources.iter().find(|source| source.is_frozen(most))?;
+        Some((format!("the source `{}`", source.name()), source.is_frozen(0)))
+    }
+
+    /// Returns the nearest place inside the polygon that this reason comes from, with its distance from
+    /// the robot, m.
+    pub(crate) fn place_in_zone(&self, reason: Reason) -> Option<(Point2<f64>, f64)> {
+        let inside = self.zones.places(reason, self.hazards.all());
+        let distances = inside.into_iter().map(|at| (at, self.footprint.distance_m(&at)));
+        distances.min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
     /// Returns the factor of the speed, and its reason, if something is in the slowdown polygon.
     pub(crate) fn slowdown(&self) -> Option<(f64, Reason)> {
         if self.settings.obstacles == ObstacleSource::None {
@@ -288,8 +316,13 @@ impl CollisionMonitor {
             || self.sources.iter().any(|source| source.is_blind(&self.settings))
     }
 
+    /// Returns the number of equal readings in a row from which on a sensor is frozen; 0 for none.
+    fn identical_frames(&self) -> u32 {
+        if self.settings.noiseless { 0 } else { self.settings.identical_frames }
+    }
+
     fn is_frozen(&self) -> bool {
-        let most = if self.settings.noiseless { 0 } else { self.settings.identical_frames };
+        let most = self.identical_frames();
         self.depth.is_frozen(most)
             || self.laser.is_frozen(most)
             || self.further_lasers.iter().any(|(laser, _)| laser.is_frozen(most))
@@ -317,7 +350,7 @@ impl CollisionMonitor {
             return Allowance::FREE;
         }
         let most = part * speed;
-        Allowance { gentle: most, most, slower: Reason::Unclear, stops: Reason::Unknown }
+        Allowance { by: None, gentle: most, most, slower: Reason::Unclear, stops: Reason::Unknown }
     }
 }
 

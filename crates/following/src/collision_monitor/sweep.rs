@@ -86,9 +86,25 @@ impl Braking {
     }
 }
 
+/// Place that limits the speed, with its distance from the outline of the robot and those below which
+/// the robot is slower, and does not move along its path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct LimitingPlace {
+    /// Place in the robot frame, m.
+    pub(crate) at: Point2<f64>,
+    /// Distance of it, m.
+    pub(crate) distance_m: f64,
+    /// Distance below which the robot is slower, m.
+    pub(crate) slower_m: f64,
+    /// Distance below which it does not move, m.
+    pub(crate) stop_m: f64,
+}
+
 /// Largest speeds that hazards allow on a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Allowance {
+    /// Place that limits the speed; `None` where no place does.
+    pub(crate) by: Option<LimitingPlace>,
     /// Largest speed from which the robot stops within the limit of the jerk.
     pub(crate) gentle: f64,
     /// Largest speed from which it stops at all.
@@ -102,6 +118,7 @@ pub(crate) struct Allowance {
 impl Allowance {
     /// No limit.
     pub(crate) const FREE: Self = Self {
+        by: None,
         gentle: f64::INFINITY,
         most: f64::INFINITY,
         slower: Reason::Obstacle,
@@ -155,11 +172,14 @@ struct Limit {
     most: f64,
     points: u32,
     is_person: bool,
+    place: LimitingPlace,
 }
 
 impl Limit {
     fn allowance(self) -> Allowance {
-        let mut allowance = Allowance { gentle: self.gentle, most: self.most, ..Allowance::FREE };
+        let by = Some(self.place);
+        let mut allowance =
+            Allowance { by, gentle: self.gentle, most: self.most, ..Allowance::FREE };
         if self.is_person {
             allowance.slower = Reason::Near;
             allowance.stops = Reason::TooClose;
@@ -235,7 +255,43 @@ impl<'a> Sweep<'a> {
             }),
         });
         let is_person = hazard.kind != HazardKind::Still;
-        (gentle < self.speed).then_some(Limit { gentle, most, points: hazard.points, is_person })
+        let points = hazard.points;
+        let place = self.place(hazard);
+        (gentle < self.speed).then_some(Limit { gentle, most, points, is_person, place })
+    }
+
+    /// Returns the place of the hazard, the last that was measured, for the words of the command.
+    fn place(&self, hazard: &Hazard) -> LimitingPlace {
+        let Braking { reaction_s, rise_s, .. } = self.braking;
+        let delay_s = reaction_s + rise_s;
+        let way_m = match self.path {
+            Path::Arc { .. } => self.braking.way(self.speed, delay_s),
+            Path::Turn { .. } => 0.0,
+        };
+        let stop_m = match (hazard.kind, self.path) {
+            (HazardKind::Still, Path::Arc { .. }) => self.settings.stop_m,
+            (HazardKind::Still, Path::Turn { .. }) => 0.5 * self.settings.side_m,
+            _ => self.margin_within(hazard, self.braking.time_s(0.0, reaction_s)),
+        };
+        let slower_m = match hazard.kind {
+            HazardKind::Still => way_m + stop_m,
+            _ => way_m + self.margin_within(hazard, self.braking.time_s(self.speed, delay_s)),
+        };
+        let distance_m = self.nearest.first().copied().unwrap_or(f64::INFINITY);
+        LimitingPlace { at: hazard.at, distance_m, slower_m, stop_m }
+    }
+
+    /// Returns the distance to keep from a hazard that may come nearer for a time, m.
+    fn margin_within(&self, hazard: &Hazard, time_s: f64) -> f64 {
+        match hazard.kind {
+            HazardKind::Still => self.settings.stop_m.max(self.settings.side_m),
+            HazardKind::Moves(closing) => {
+                self.comes_m(closing, time_s) + self.settings.protective_m
+            }
+            HazardKind::Followed(closing) => {
+                closing.max(0.0) * time_s + self.settings.followed_stop_m
+            }
+        }
     }
 
     /// Returns the distance, m, by which a person may be nearer after `time_s`.
@@ -251,15 +307,7 @@ impl<'a> Sweep<'a> {
     /// Returns the largest distance that may matter between the swept area and the hazard, m.
     fn margin_m(&self, hazard: &Hazard) -> f64 {
         let time_s = self.braking.time_s(self.speed, self.braking.reaction_s + self.braking.rise_s);
-        match hazard.kind {
-            HazardKind::Still => self.settings.stop_m.max(self.settings.side_m),
-            HazardKind::Moves(closing) => {
-                self.comes_m(closing, time_s) + self.settings.protective_m
-            }
-            HazardKind::Followed(closing) => {
-                closing.max(0.0) * time_s + self.settings.followed_stop_m
-            }
-        }
+        self.margin_within(hazard, time_s)
     }
 
     /// Returns true if no pose comes near enough, without looking at each.

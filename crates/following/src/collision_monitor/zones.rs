@@ -48,6 +48,21 @@ impl Zones {
         let is_person = self.slowdown.content(self.min_points)?;
         Some(if is_person { Reason::Near } else { Reason::Obstacle })
     }
+
+    /// Returns the places inside the polygon that a reason comes from, those of its kind of hazard;
+    /// none if the reason does not come from a polygon.
+    pub(super) fn places(&self, reason: Reason, hazards: &[Hazard]) -> Vec<Point2<f64>> {
+        let zone = if self.stop_reason() == Some(reason) {
+            &self.stop
+        } else if self.slowdown_reason() == Some(reason) {
+            &self.slowdown
+        } else {
+            return Vec::new();
+        };
+        let is_person = matches!(reason, Reason::TooClose | Reason::Near);
+        let own = hazards.iter().filter(|it| (it.kind != HazardKind::Still) == is_person);
+        own.map(|hazard| hazard.at).filter(|at| zone.holds(at)).collect()
+    }
 }
 
 impl Zone {

@@ -44,6 +44,9 @@ pub enum LockState {
     Lost,
     /// A track that seems to be the person is followed slowly.
     Refound,
+    /// The followed track is kept, but a sensor is frozen: whether the person is there is not known.
+    /// Reports alone have this state.
+    NotKnown,
 }
 
 impl LockState {
@@ -56,6 +59,7 @@ impl LockState {
             Self::Suspect => "suspect",
             Self::Lost => "lost",
             Self::Refound => "re-found",
+            Self::NotKnown => "not known",
         }
     }
 
@@ -68,12 +72,16 @@ impl LockState {
             Self::Suspect => "a track is followed slowly that may not be the person",
             Self::Lost => "no track is followed; the person is searched for",
             Self::Refound => "a track that seems to be the person is followed slowly",
+            Self::NotKnown => "whether the person is there is not known: a sensor is frozen",
         }
     }
 
     /// Returns true if a track is followed.
     pub fn follows(self) -> bool {
-        matches!(self, Self::Training | Self::Locked | Self::Suspect | Self::Refound)
+        matches!(
+            self,
+            Self::Training | Self::Locked | Self::Suspect | Self::Refound | Self::NotKnown
+        )
     }
 
     /// Returns true if the followed track may be another person.
@@ -96,6 +104,22 @@ pub struct LockReport {
     pub belief: Option<f64>,
     /// Similarity of each seen track to the person.
     pub likeness: Vec<Likeness>,
+}
+
+impl LockReport {
+    /// Returns the report while a sensor is frozen, for so many seconds: what it shows of the person is
+    /// old, however well that fits.
+    pub(crate) fn of_frozen_sensor(self, needs_reset: bool, since_s: f64) -> Self {
+        if !self.state.follows() {
+            return self;
+        }
+        let why = if needs_reset {
+            "a sensor is frozen: check it, then reset"
+        } else {
+            "a sensor repeats itself"
+        };
+        Self { state: LockState::NotKnown, why, since_s, belief: None, ..self }
+    }
 }
 
 /// Similarity of a track to the person in one frame.

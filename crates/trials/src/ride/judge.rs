@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Point2, Vector2};
 use serde::Serialize;
-use tagalong_core::Track;
+use tagalong_core::{Reason, Track};
 use tagalong_pipeline::{FrameReport, Likeness};
 use tagalong_sim::{Clearance, Truth};
 
@@ -365,8 +365,10 @@ fn never_moved(ticks: &[Tick]) -> Option<&'static str> {
 fn reasons(ticks: &[Tick]) -> Vec<ReasonShare> {
     let mut counts: BTreeMap<(&'static str, &'static str), usize> = BTreeMap::new();
     for tick in ticks {
-        let reason = tick.reason.map_or(("no command", "stands"), |it| (it.name(), it.effect()));
-        *counts.entry(reason).or_default() += 1;
+        let name = tick.reason.map_or("no command", Reason::name);
+        // A robot that is slowed down to zero stands.
+        let effect = tick.reason.filter(|_| !tick.is_still).map_or("stands", Reason::effect);
+        *counts.entry((name, effect)).or_default() += 1;
     }
     let mut shares = Vec::new();
     for ((reason, effect), count) in counts {
@@ -456,7 +458,16 @@ mod tests {
 
     fn tick(speed_mps: f64, turn_rate: f64, reason: Option<Reason>) -> Tick {
         let clearance = Clearance { people_m: 1.0, things_m: 1.0 };
-        Tick { at_s: 0.0, speed_mps, turn_rate, clearance, approach: None, reason, crowd: None }
+        Tick { at_s: 0.0, speed_mps, turn_rate, clearance, approach: None, reason, is_still: false, crowd: None }
+    }
+
+    #[test]
+    fn a_robot_that_is_slowed_down_to_zero_stands() {
+        let ticks = [(0.2, false), (0.0, true), (0.0, true), (0.0, true)]
+            .map(|(mps, is_still)| Tick { is_still, ..tick(mps, 0.0, Some(Reason::Near)) });
+        let shares: Vec<_> =
+            reasons(&ticks).iter().map(|it| (it.reason, it.effect, it.share)).collect();
+        assert_eq!(shares, [("near", "stands", 0.75), ("near", "slower", 0.25)]);
     }
 
     #[test]

@@ -75,6 +75,8 @@ pub struct Tick {
     pub approach: Option<ApproachState>,
     /// Reason of the command in force; `None` while the enable lets nothing move.
     pub reason: Option<Reason>,
+    /// True where that command neither drives nor turns.
+    pub is_still: bool,
 }
 
 impl Tick {
@@ -299,7 +301,7 @@ impl Ride {
             let is_granted =
                 enable.as_mut().is_none_or(|enable| enable.is_granted(at_ns as f64 * 1e-9));
             let command = command(pipeline, now, since_frame).filter(|_| is_granted);
-            let tick = tick(simulation, at_ns, command.map(|command| command.reason));
+            let tick = tick(simulation, at_ns, command);
             self.look(simulation, &tick);
             witness.tick(&tick);
             self.ticks.push(tick);
@@ -322,7 +324,7 @@ fn sources(frame: &Frame) -> Sources {
     Sources { depth: frame.depth().is_ok(), right, laser, odometry: true }
 }
 
-fn tick(simulation: &Simulation, at_ns: u64, reason: Option<Reason>) -> Tick {
+fn tick(simulation: &Simulation, at_ns: u64, command: Option<Command>) -> Tick {
     Tick {
         at_s: at_ns as f64 * 1e-9,
         speed_mps: simulation.speed_mps(),
@@ -330,7 +332,8 @@ fn tick(simulation: &Simulation, at_ns: u64, reason: Option<Reason>) -> Tick {
         clearance: simulation.clearance(ROBOT_RADIUS_M),
         crowd: simulation.crowd_view(),
         approach: simulation.approach(ROBOT_RADIUS_M),
-        reason,
+        reason: command.map(|command| command.reason),
+        is_still: command.is_none_or(|command| command.effect() == "stands"),
     }
 }
 

@@ -118,6 +118,9 @@ pub struct DriveData {
     pub belief: Option<f64>,
     /// Reason of the command, and its meaning.
     pub reason: [String; 2],
+    /// The person, the place or the sensor that is the cause; empty where there is none.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub cause: String,
     /// Commanded speed, m/s.
     pub v: f64,
     /// Commanded rate of turn, to the left, rad/s.

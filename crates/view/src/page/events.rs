@@ -117,7 +117,10 @@ impl Watch {
     /// comes and goes from frame to frame is told once.
     fn compare_motion(&mut self, at: usize, t_s: f64, moment: &Moment) {
         let Some(drive) = &moment.notes.drive else { return };
+        // To stand at the distance to keep, or to begin, is no event.
+        let is_as_asked = matches!(drive.reason.as_str(), "follow" | "limited");
         let kind = match drive.motion.as_str() {
+            "stands" if is_as_asked => return,
             "stands" => "stands",
             "slower" => "slower",
             "drives" if std::mem::take(&mut self.stood) => {
@@ -128,7 +131,8 @@ impl Watch {
         let is_new_stop = kind == "stands" && !std::mem::replace(&mut self.stood, true);
         let before = self.causes.insert(drive.reason.clone(), t_s);
         if is_new_stop || before.is_none_or(|before_s| t_s - before_s > SAME_CAUSE_S) {
-            self.tell(at, kind, None, drive.reason_about.clone());
+            let cause = if drive.cause.is_empty() { "" } else { ": " };
+            self.tell(at, kind, None, format!("{}{cause}{}", drive.reason_about, drive.cause));
         }
     }
 
@@ -263,6 +267,27 @@ mod tests {
         let told = of_run(&[0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6], &all);
         let kinds: Vec<_> = told.iter().map(|event| (event.i, event.kind)).collect();
         assert_eq!(kinds, [(1, "slower"), (4, "stands"), (5, "stands"), (6, "drives")]);
+    }
+
+    #[test]
+    fn a_stop_is_told_with_its_cause_and_a_robot_that_arrived_is_none() {
+        fn of(reason: &str, cause: &str) -> Moment {
+            let mut moment = moment(&[]);
+            moment.notes.drive = Some(DriveNote {
+                motion: "stands".into(),
+                reason: reason.into(),
+                reason_about: "stands: why".into(),
+                cause: cause.into(),
+                ..DriveNote::default()
+            });
+            moment
+        }
+
+        let moments = [of("follow", ""), of("near", "person 3, 0.84 m"), of("fault", "")];
+        let all: Vec<Option<&Moment>> = moments.iter().map(Some).collect();
+        let told = of_run(&[0.0, 0.1, 0.2], &all);
+        let texts: Vec<_> = told.iter().map(|event| event.text.as_str()).collect();
+        assert_eq!(texts, ["stands: why: person 3, 0.84 m", "stands: why"]);
     }
 
     #[test]

@@ -129,6 +129,7 @@ fn drive_data(note: &DriveNote) -> DriveData {
         since: note.since_s,
         belief: note.belief,
         reason: [note.reason.clone(), note.reason_about.clone()],
+        cause: note.cause.clone(),
         v: note.forward_mps,
         w: note.turn_rps,
         motion: note.motion.clone(),

@@ -570,7 +570,7 @@
     return place.replaceChildren(table(`Target and command of ${run.name}`, ["Part", "State", "Meaning"], [
       row("Target", target, `${now.lock[1]}${sure}`),
       row("Lock", now.lock[0], `for ${fixed(now.since, 1)} s: ${now.why}`),
-      row("Command", now.reason[0], now.reason[1]),
+      row("Command", now.reason[0], now.cause ? `${now.reason[1]}: ${now.cause}` : now.reason[1]),
       row("Speed", `${fixed(now.v, 2)} m/s`, turnOf(now.w)),
     ]));
   };

@@ -122,6 +122,9 @@ pub struct FollowArgs {
     /// Approaches to a robot with a laser scanner.
     #[arg(long, value_enum, default_value_t)]
     pub laser: ApproachLaser,
+    /// Print how far the probabilities of the lock can be believed, too; files always have it.
+    #[arg(long)]
+    pub calibration: bool,
     /// Output format.
     #[arg(long, value_enum, default_value_t)]
     pub format: TableFormat,
@@ -441,12 +444,7 @@ fn report(args: &FollowArgs, seeds: Seeds, results: &[Followed]) -> Result<(), F
         TableFormat::Json => print(&json)?,
         TableFormat::Markdown => print(&markdown)?,
         TableFormat::Text => {
-            // The course of events is readable for a single ride only.
-            if let [one] = results {
-                print(&(one.story.join("\n") + "\n\n"))?;
-            }
-            print(&tables.iter().map(Table::text).collect::<Vec<_>>().join("\n"))?;
-            print(&format!("\n{}\n", reasons::lines(results).join("\n")))?;
+            print(&text(results, &tables, args.calibration))?;
         }
     }
     if let Some(looks) = looks.filter(|_| args.format != TableFormat::Json) {
@@ -461,6 +459,26 @@ fn report(args: &FollowArgs, seeds: Seeds, results: &[Followed]) -> Result<(), F
     let shown = folder.display();
     say(&format!("the logs and tables are in {shown}; `tagalong view {shown}` shows the rides"));
     Ok(())
+}
+
+/// Returns the findings for a terminal: the causes and the scores, then the course of a single ride,
+/// and the calibration last, if it is wanted.
+fn text(results: &[Followed], tables: &[Table], calibration: bool) -> String {
+    let mut parts = vec![reasons::lines(results).join("\n") + "\n"];
+    let mut last = Vec::new();
+    for table in tables {
+        if !table.title.starts_with(table::CALIBRATION) {
+            parts.push(table.text());
+        } else if calibration {
+            last.push(table.text());
+        }
+    }
+    // The course of events is readable for a single ride only.
+    if let [one] = results {
+        parts.push(one.story.join("\n") + "\n");
+    }
+    parts.extend(last);
+    parts.join("\n")
 }
 
 #[cfg(test)]

@@ -37,7 +37,7 @@ pub fn lines(results: &[Followed]) -> Vec<String> {
             *sums[at].shares.entry((share.effect, share.reason)).or_default() += share.share;
         }
     }
-    let title = "Why the robot stood or drove slower, by the share of the time:".to_owned();
+    let title = "Why the robot did not drive (it may turn), or drove slower, by the share of the time:".to_owned();
     let all = labels.iter().zip(&sums).map(|(label, sums)| {
         let of = if has_line_each {
             String::new()
@@ -65,6 +65,7 @@ impl Sums {
         let all: f64 = shares.iter().map(|(_, share)| share).sum();
         let each: Vec<String> =
             shares.iter().map(|(reason, share)| format!("{reason} {}", percent(*share))).collect();
+        let effect = if effect == "stands" { "does not drive" } else { effect };
         (!each.is_empty()).then(|| format!("{effect} {} ({})", percent(all), each.join(", ")))
     }
 }
@@ -101,7 +102,7 @@ mod tests {
         assert_eq!(
             told[1..],
             [
-                "  turns: low, seed 7: stands 20 % (no-target 20 %, blocked <1 %); slower 20 % (near 20 %)",
+                "  turns: low, seed 7: does not drive 20 % (no-target 20 %, blocked <1 %); slower 20 % (near 20 %)",
                 "  turns: low, seed 8: drove as asked",
             ]
         );
@@ -110,7 +111,7 @@ mod tests {
         let told = lines(&many);
         assert_eq!(told.len(), 2, "{told:?}");
         assert!(
-            told[1].starts_with("  turns: low, 20 rides: stands 10 % (no-target 10 %"),
+            told[1].starts_with("  turns: low, 20 rides: does not drive 10 % (no-target 10 %"),
             "{told:?}"
         );
     }

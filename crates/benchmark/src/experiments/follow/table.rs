@@ -10,6 +10,9 @@ use super::{Followed, crowd_table};
 /// Steps of the reliability curve.
 const BINS: usize = 10;
 
+/// Begin of the titles of the tables that compare the probabilities of a lock with the truth.
+pub const CALIBRATION: &str = "How far the lock of";
+
 /// Columns of the scores. Those that tell controllers apart come first; nearly all rides are kept, also
 /// by a controller that finds no person again.
 const COLUMNS: [&str; 14] = [
@@ -211,7 +214,7 @@ fn reliabilities(results: &[Followed], pipeline: &str, seeds: Seeds) -> Vec<Tabl
     if all.peek().is_none() {
         return Vec::new();
     }
-    let title = format!("How far the lock of {pipeline} can be believed");
+    let title = format!("{CALIBRATION} {pipeline} can be believed");
     let mut tables = vec![reliability(title.clone(), &of, |like| like.probability, seeds)];
     if all.any(|like| (like.probability - uncalibrated(like)).abs() > 1e-9) {
         tables.push(reliability(

@@ -128,3 +128,22 @@ fn a_config_without_a_controller_leads_to_those_with_one() {
     assert!(refused.contains("built-in configs with one: "), "{refused}");
     assert!(refused.contains("follow-depth") && !refused.contains("depth-verified"), "{refused}");
 }
+
+#[test]
+fn the_summary_is_first_and_the_calibration_last_and_on_request() {
+    fn table(title: &str) -> Table {
+        let title = title.to_owned();
+        Table { title, columns: Vec::new(), rows: Vec::new(), notes: Vec::new() }
+    }
+
+    let tables = [table("Following"), table("How far the lock of a can be believed")];
+    let ride = Followed { story: vec!["0.1 s  track 1".into()], ..Followed::default() };
+    let order = ["Why the robot", "Following", "0.1 s  track 1", "How far the lock"];
+    let with = text(std::slice::from_ref(&ride), &tables, true);
+    let places: Vec<_> = order.iter().map(|part| with.find(part).expect("is told")).collect();
+    assert!(places.is_sorted(), "{with}");
+    let without = text(std::slice::from_ref(&ride), &tables, false);
+    assert!(!without.contains("How far the lock") && without.contains("Following"), "{without}");
+    let two = text(&[ride.clone(), ride], &tables, false);
+    assert!(!two.contains("track 1"), "{two}");
+}

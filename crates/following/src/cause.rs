@@ -1,0 +1,154 @@
+//! Cause of a stop or of a lower speed, by name and with its distance.
+
+use std::fmt;
+
+use nalgebra::Point2;
+use tagalong_core::{Reason, Track, TrackId};
+
+use crate::collision_monitor::{Allowance, CollisionMonitor};
+
+/// Distance from a track within which a place is that of the person, m.
+const OF_PERSON_M: f64 = 0.4;
+
+/// Cause of the reason of a command.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Cause {
+    /// A place that limits the speed.
+    Place(PlaceCause),
+    /// A sensor that is frozen.
+    Sensor {
+        /// Name of the sensor.
+        name: String,
+        /// True if the stop lasts until a person has checked the robot and resets it.
+        needs_reset: bool,
+    },
+}
+
+/// Place that limits the speed.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct PlaceCause {
+    /// The person there, if it is a tracked one.
+    pub track: Option<TrackId>,
+    /// The place in the robot frame, m.
+    pub at: Point2<f64>,
+    /// Distance of it from the outline of the robot, m.
+    pub distance_m: f64,
+    /// Distance below which the robot is slower, or does not drive, m; `None` for a place inside a
+    /// polygon of the settings.
+    pub limit_m: Option<f64>,
+}
+
+impl Cause {
+    /// Finds the cause of a reason: among the allowances that were asked for, in their order, or
+    /// among the sensors.
+    pub(crate) fn of(
+        reason: Reason,
+        asked: &[Allowance],
+        monitor: &CollisionMonitor,
+        tracks: &[Track],
+    ) -> Option<Self> {
+        if reason == Reason::Frozen {
+            let (name, needs_reset) = monitor.frozen_sensor()?;
+            return Some(Self::Sensor { name, needs_reset });
+        }
+        let is_person = match reason {
+            Reason::Near | Reason::TooClose => true,
+            Reason::Obstacle | Reason::Blocked => false,
+            _ => return None,
+        };
+        // The polygons stop and slow down whatever the path allows.
+        if let Some((at, distance_m)) = monitor.place_in_zone(reason) {
+            return Some(Self::at(at, distance_m, None, is_person, tracks));
+        }
+        let stops = !reason.moves();
+        let why = asked.iter().filter(|it| reason == if stops { it.stops } else { it.slower });
+        let place = why.filter_map(|allowed| allowed.by).next()?;
+        let limit_m = if stops { place.stop_m } else { place.slower_m };
+        Some(Self::at(place.at, place.distance_m, Some(limit_m), is_person, tracks))
+    }
+
+    fn at(
+        at: Point2<f64>,
+        distance_m: f64,
+        limit_m: Option<f64>,
+        is_person: bool,
+        tracks: &[Track],
+    ) -> Self {
+        let mut nearest: Option<(TrackId, f64)> = None;
+        for track in tracks.iter().filter(|track| is_person && track.confirmed) {
+            let away_m = (track.estimate.person.position.xy() - at).norm();
+            if away_m <= OF_PERSON_M && nearest.is_none_or(|(_, least_m)| away_m < least_m) {
+                nearest = Some((track.id, away_m));
+            }
+        }
+        let track = nearest.map(|(id, _)| id);
+        Self::Place(PlaceCause { track, at, distance_m, limit_m })
+    }
+}
+
+/// In words that follow the sentence of the reason.
+impl fmt::Display for Cause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Place(place) => place.fmt(f),
+            Self::Sensor { name, needs_reset: true } => {
+                write!(f, "{name}; the robot stands until a reset: check the sensor first")
+            }
+            Self::Sensor { name, needs_reset: false } => {
+                write!(f, "{name}; the robot stands until it delivers new readings")
+            }
+        }
+    }
+}
+
+impl fmt::Display for PlaceCause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.track {
+            Some(id) => write!(f, "person {id}")?,
+            None => {
+                let side = if self.at.y < 0.0 { "right" } else { "left" };
+                let way = if self.at.x < 0.0 { "behind" } else { "ahead" };
+                let [x, y] = [self.at.x.abs(), self.at.y.abs()];
+                write!(f, "the place {x:.1} m {way}, {y:.1} m to the {side}")?;
+            }
+        }
+        write!(f, ", {:.2} m from the robot, ", self.distance_m.max(0.0))?;
+        match self.limit_m {
+            Some(limit_m) => write!(f, "limit {limit_m:.2} m"),
+            None => f.write_str("inside a zone of the settings"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector2;
+    use tagalong_conformance::target;
+
+    use super::*;
+
+    #[test]
+    fn a_person_is_named_by_the_track_and_a_thing_by_its_place() {
+        let track = target(1.3, 0.1, Vector2::zeros()).with_id(TrackId(3)).with_confirmed(true);
+        let at = Point2::new(1.1, 0.1);
+        let person = Cause::at(at, 0.84, Some(1.5), true, std::slice::from_ref(&track));
+        assert_eq!(person.to_string(), "person 3, 0.84 m from the robot, limit 1.50 m");
+        let thing = Cause::at(at, 0.84, None, false, &[track]);
+        assert_eq!(
+            thing.to_string(),
+            "the place 1.1 m ahead, 0.1 m to the left, 0.84 m from the robot, inside a zone of the settings"
+        );
+    }
+
+    #[test]
+    fn a_frozen_sensor_says_whether_a_reset_is_needed() {
+        fn told(needs_reset: bool) -> Cause {
+            Cause::Sensor { name: "the depth image".into(), needs_reset }
+        }
+
+        assert!(told(true).to_string().contains("until a reset"));
+        assert!(!told(false).to_string().contains("reset"));
+    }
+}
