@@ -101,8 +101,8 @@ impl DepthImage {
     ///
     /// ```
     /// use tagalong_core::DepthImage;
-    /// let depth = DepthImage::from_millimetres(2, 1, &[1500, 0]).expect("two pixels");
-    /// assert_eq!(depth.get(0, 0), Some(1.5));
+    /// let depth = DepthImage::from_millimetres(2, 1, &[2000, 0]).expect("two pixels");
+    /// assert_eq!(depth.get(0, 0), Some(2.0));
     /// assert!(depth.get(1, 0).is_some_and(f32::is_nan));
     /// ```
     pub fn from_millimetres(width: usize, height: usize, pixels: &[u16]) -> Option<Self> {

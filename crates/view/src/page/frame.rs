@@ -220,7 +220,7 @@ mod tests_of_data {
         let lines = &tests["head width"].settings;
         assert!(lines.iter().any(|line| line.contains("min_head_width_m = 0.1")), "{lines:?}");
         assert!(
-            tests["head width"].why.ends_with("min_head_width_m = 0.1 }: hats"),
+            tests["head width"].why.ends_with("min_head_width_m = 0.1 (d): hats"),
             "{:?}",
             tests["head width"]
         );
