@@ -112,8 +112,8 @@ pub use tagalong_following::{
     Base, BlindZone, Cause, Choice, ChoiceRule, CollisionMonitorSettings, CommandLimiterSettings,
     Differences, Enable, EnableSwitch, Enrollment, EnrollmentError, FollowSettings, FollowStatus,
     Likeness, LockReport, LockState, LooksSettings, ObstaclePoint, ObstacleSource, OdometrySource,
-    Orders, Permission, PlaceCause, RobotSettings, SafetyDistances, SearchSettings, SourceKind, SourceSettings,
-    TargetSettings,
+    Orders, Permission, PlaceCause, RobotSettings, SafetyDistances, SearchSettings, SourceKind,
+    SourceSettings, TargetSettings,
 };
 pub use tagalong_stereo::StereoSettings;
 pub use tagalong_tracking::StepError;

@@ -1,6 +1,6 @@
 use nalgebra::Point2;
 use tagalong_geometry::Rect;
-use tagalong_pipeline::FrameReport;
+use tagalong_pipeline::{FrameReport, Outcome};
 use tagalong_vision::Sketch;
 
 use super::canvas::{Canvas, Ink, LINE_PX, Lettering};
@@ -63,10 +63,12 @@ fn title(scene: &OverlayData, trails: &Trails, style: OverlayStyle) -> String {
     format!("frame {}   {s}.{ms:03} s   {people}{drive}", scene.report.index)
 }
 
-/// Returns the number of people that are seen; a frame that came too late has none.
+/// Returns the number of people that are seen; a frame that is not used says so.
 fn seen(scene: &OverlayData) -> String {
-    if !scene.report.outcome.is_processed() {
-        return "late, not used".to_owned();
+    match scene.report.outcome {
+        Outcome::OutOfOrder => return "late, not used".to_owned(),
+        Outcome::Duplicate => return "repeated, not used".to_owned(),
+        _ => {}
     }
     match scene.report.tracks.iter().filter(|t| t.confirmed && t.seen).count() {
         1 => "1 person seen".to_owned(),
@@ -184,4 +186,31 @@ fn counts(scene: &OverlayData, columns: usize) -> String {
         text += &part;
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use tagalong_core::{Command, Reason, Stamp, TrackId, Twist, WheelSpeeds};
+
+    use super::*;
+
+    #[test]
+    fn the_title_has_target_command_and_reason_where_there_is_a_controller() {
+        let mut report = FrameReport::new(3, Stamp::default());
+        assert_eq!(drive(&report), "");
+        let at = Stamp::default();
+        let twist = Twist::new(0.42, -0.1);
+        report.command = Some(Command::new(twist, WheelSpeeds::STOP, at, at, Reason::Near));
+        assert_eq!(drive(&report), "   no target   0.42 m/s -0.10 rad/s: near");
+        report.target = Some(TrackId(7));
+        assert!(drive(&report).starts_with("   target 7   "));
+    }
+
+    #[test]
+    fn a_late_frame_is_said_to_be_not_used() {
+        let mut scene = super::super::tests::scene(&[], Vec::new());
+        assert_eq!(seen(&scene), "0 people seen");
+        scene.report.outcome = Outcome::OutOfOrder;
+        assert_eq!(seen(&scene), "late, not used");
+    }
 }

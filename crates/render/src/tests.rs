@@ -21,7 +21,7 @@ fn track(id: u32, camera: &Camera) -> Track {
     Track::new(TrackId(id), Estimate::new(person, covariance, region), 3.0).with_age(5)
 }
 
-fn scene(tracks: &[u32], candidates: Vec<Candidate>) -> OverlayData {
+pub(crate) fn scene(tracks: &[u32], candidates: Vec<Candidate>) -> OverlayData {
     let lens = Pinhole { fx: 260.0, fy: 260.0, cx: 159.5, cy: 119.5, distortion: Distortion::None };
     let camera = Camera::mounted(lens, 320, 240, 1.2, 0.0, 0.0);
     let depth = Some(Arc::new(DepthImage::filled(320, 240, 4.0)));
@@ -289,4 +289,15 @@ fn a_person_who_is_not_seen_has_no_trail_and_a_gap_splits_it() {
     }
     let pieces: Vec<usize> = trails.in_robot(&scene).iter().map(|(_, at)| at.len()).collect();
     assert_eq!(pieces, [5, 5]);
+}
+
+#[test]
+fn the_label_of_the_target_says_so() {
+    let mut scene = scene(&[1], Vec::new());
+    scene.report.tracks[0].confirmed = true;
+    let plain = image_view::placed_labels(&scene, CALM);
+    assert!(!plain.bars()[0].1.contains("target"), "{:?}", plain.bars());
+    scene.report.target = Some(TrackId(1));
+    let labels = image_view::placed_labels(&scene, CALM);
+    assert!(labels.bars()[0].1.starts_with("1 target "), "{:?}", labels.bars());
 }

@@ -248,7 +248,8 @@ fn table(rides: &[Ride], from: Option<&Path>) -> Markup {
 
 /// Returns whether the person was kept, and the reason of a robot that never moved.
 fn kept(ride: &RideFacts) -> String {
-    let lost = ride.lost_to_the_end_s().map_or(String::new(), |at_s| format!(", lost at {at_s:.1} s"));
+    let lost =
+        ride.lost_to_the_end_s().map_or(String::new(), |at_s| format!(", lost at {at_s:.1} s"));
     let answer = match (ride.kept, lost.is_empty()) {
         (true, true) => "yes".to_owned(),
         (true, false) => format!("as far as possible{lost}"),
@@ -328,9 +329,10 @@ mod tests {
         let mut facts = RideFacts { kept: true, ..RideFacts::default() };
         assert_eq!(kept(&facts), "yes");
         assert!(facts.summary().starts_with("the person was kept;"), "{}", facts.summary());
-        facts.episodes =
-            serde_json::from_str(r#"[{"lost_s":2.0,"found_s":3.0},{"lost_s":8.94,"found_s":null}]"#)
-                .unwrap();
+        facts.episodes = serde_json::from_str(
+            r#"[{"lost_s":2.0,"found_s":3.0},{"lost_s":8.94,"found_s":null}]"#,
+        )
+        .unwrap();
         assert_eq!(kept(&facts), "as far as possible, lost at 8.9 s");
         assert!(!facts.summary().contains("was kept"), "{}", facts.summary());
         facts.kept = false;

@@ -444,6 +444,22 @@ mod tests {
     }
 
     #[test]
+    fn the_place_that_limits_the_speed_is_nearer_than_its_limit() {
+        for hazard in
+            [still(0.6, 0.0), still(1.1, 0.0), moving(1.1, 0.0, 1.6), moving(2.2, 0.0, 1.6)]
+        {
+            let Allowance { by, most, .. } = allowed(hazard, AHEAD, 0.9);
+            let place = by.expect("a place limits the speed");
+            let gap_m = hazard.at.x - octagon().front_m();
+            assert_eq!(place.at, hazard.at);
+            assert!((place.distance_m - gap_m).abs() < 1e-9, "{place:?} {gap_m}");
+            assert_eq!(place.distance_m < place.stop_m, most == 0.0, "{place:?} {most}");
+            assert!(place.distance_m < place.slower_m, "{place:?}");
+        }
+        assert_eq!(allowed(still(2.2, 0.0), AHEAD, 0.9).by, None);
+    }
+
+    #[test]
     fn what_is_beside_the_way_is_free_and_what_a_corner_sweeps_is_not() {
         assert_eq!(allowed(still(1.0, 0.36), AHEAD, 0.9), Allowance::FREE);
         assert!(allowed(still(1.0, 0.3), AHEAD, 0.9).most < 0.9);

@@ -112,9 +112,11 @@ fn the_same_depth_image_again_is_frozen_and_a_noisy_one_is_not() {
     }
     assert_eq!(reasons[3], None);
     assert!(reasons[4..].iter().all(|reason| *reason == Some(Reason::Frozen)), "{reasons:?}");
+    assert_eq!(monitor.frozen_sensor(), Some(("the depth image".into(), false)));
     let frame = frame(29, EgoMotion::at_rest(0.1), Some(depth_at(29, 0.0, 0.0)), None);
     monitor.update(&frame, &frame.motion, &[], None);
     assert_eq!(monitor.stop_reason(0.5), None, "it goes on");
+    assert_eq!(monitor.frozen_sensor(), None);
 }
 
 #[test]
@@ -154,6 +156,9 @@ fn a_picture_that_does_not_change_as_the_odometry_says_is_frozen() {
                 }
                 let expected = is_frozen.then_some(Reason::Frozen);
                 assert_eq!(last, expected, "{forward} {turn} laser {by_laser}");
+                let name = if by_laser { "the laser scanner" } else { "the depth image" };
+                let sensor = is_frozen.then(|| (name.to_owned(), true));
+                assert_eq!(monitor.frozen_sensor(), sensor, "{forward} {turn}");
             }
         }
     }

@@ -119,6 +119,9 @@ mod tests {
         assert_eq!((zones.stop_reason(), zones.slowdown_reason()), (None, Some(Reason::Near)));
         zones.update(&[hazard(0.5, 6, HazardKind::Moves(0.3))]);
         assert_eq!(zones.stop_reason(), Some(Reason::TooClose));
+        let both = [hazard(0.5, 6, HazardKind::Moves(0.3)), hazard(0.4, 1, HazardKind::Still)];
+        assert_eq!(zones.places(Reason::TooClose, &both), [both[0].at]);
+        assert_eq!(zones.places(Reason::Blocked, &both), []);
         let mut none = Zones::new(&CollisionMonitorSettings::default());
         none.update(&[hazard(0.3, 99, HazardKind::Still)]);
         assert_eq!((none.stop_reason(), none.slowdown_reason()), (None, None));

@@ -336,7 +336,8 @@ mod tests {
             clearance: Clearance { people_m: gap_m, things_m: 4.0 },
             crowd: None,
             approach: Some(ApproachState { gap_m, bearing_rad: -1.6, speed_mps: 1.0 }),
-            reason: Some(Reason::Follow), is_still: false,
+            reason: Some(Reason::Follow),
+            is_still: false,
         });
         Ride {
             seed: 1,

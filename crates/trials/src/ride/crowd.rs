@@ -161,7 +161,8 @@ mod tests {
                 clearance: Clearance { people_m: 0.5, things_m: 0.5 },
                 crowd: None,
                 approach: None,
-                reason: None, is_still: false,
+                reason: None,
+                is_still: false,
             };
             change(at_s, &mut tick, &mut view);
             tick.crowd = Some(view);

@@ -458,7 +458,16 @@ mod tests {
 
     fn tick(speed_mps: f64, turn_rate: f64, reason: Option<Reason>) -> Tick {
         let clearance = Clearance { people_m: 1.0, things_m: 1.0 };
-        Tick { at_s: 0.0, speed_mps, turn_rate, clearance, approach: None, reason, is_still: false, crowd: None }
+        Tick {
+            at_s: 0.0,
+            speed_mps,
+            turn_rate,
+            clearance,
+            approach: None,
+            reason,
+            is_still: false,
+            crowd: None,
+        }
     }
 
     #[test]

@@ -37,7 +37,9 @@ pub fn lines(results: &[Followed]) -> Vec<String> {
             *sums[at].shares.entry((share.effect, share.reason)).or_default() += share.share;
         }
     }
-    let title = "Why the robot did not drive (it may turn), or drove slower, by the share of the time:".to_owned();
+    let title =
+        "Why the robot did not drive (it may turn), or drove slower, by the share of the time:"
+            .to_owned();
     let all = labels.iter().zip(&sums).map(|(label, sums)| {
         let of = if has_line_each {
             String::new()

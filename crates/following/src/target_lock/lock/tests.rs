@@ -247,3 +247,20 @@ fn a_track_that_was_out_of_sight_teaches_nothing_at_first() {
     assert!(off_m[..5].iter().all(|off_m| (off_m - 0.03).abs() < 1e-9), "{off_m:?}");
     assert!(off_m[13] < 0.025, "then it is learned again: {off_m:?}");
 }
+
+#[test]
+fn while_a_sensor_is_frozen_the_lock_is_not_known_unless_nobody_is_followed() {
+    let report = LockReport {
+        state: LockState::Locked,
+        why: "known well",
+        since_s: 9.0,
+        belief: Some(1.0),
+        likeness: Vec::new(),
+    };
+    let told = report.clone().of_frozen_sensor(true, 0.3);
+    assert_eq!((told.state.name(), told.belief, told.since_s), ("not known", None, 0.3));
+    assert!(told.why.contains("reset") && told.state.follows(), "{told:?}");
+    assert!(!report.clone().of_frozen_sensor(false, 0.3).why.contains("reset"));
+    let lost = LockReport { state: LockState::Lost, ..report };
+    assert_eq!(lost.clone().of_frozen_sensor(true, 0.3), lost);
+}
