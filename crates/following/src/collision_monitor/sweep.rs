@@ -446,7 +446,7 @@ mod tests {
     #[test]
     fn the_place_that_limits_the_speed_is_nearer_than_its_limit() {
         for hazard in
-            [still(0.6, 0.0), still(1.1, 0.0), moving(1.1, 0.0, 1.6), moving(2.2, 0.0, 1.6)]
+            [still(0.55, 0.0), still(1.1, 0.0), moving(1.1, 0.0, 1.6), moving(2.2, 0.0, 1.6)]
         {
             let Allowance { by, most, .. } = allowed(hazard, AHEAD, 0.9);
             let place = by.expect("a place limits the speed");
