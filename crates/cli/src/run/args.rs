@@ -24,7 +24,8 @@ fn config_help() -> String {
 /// Arguments of `tagalong run`.
 #[derive(Args, Clone, Debug)]
 pub struct RunArgs {
-    // The help is made from the list of pipelines, below.
+    /// The pipeline: a TOML file or the name of a built-in one.
+    // The help has the names of the list of pipelines.
     #[arg(help = config_help())]
     pub config: Option<PathBuf>,
     /// The log: .mcap, .db3, .bag, or the folder of a recording [default: a short simulated one, written to
