@@ -83,7 +83,7 @@ fn detecting(c: &mut Criterion) {
     });
 }
 
-/// What finds people in circular images.
+/// Detectors of people in circular images.
 struct Sight {
     camera: Arc<Camera>,
     unwrapping: Unwrapping,

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::Command;
 use std::{env, io};
 
-/// The one target whose linker comes with Rust, and is used unless somebody names another.
+/// The one target for which the linker comes with Rust, and is used unless another is named.
 const TARGET: &str = "x86_64-unknown-linux-gnu";
 
 fn main() -> io::Result<()> {

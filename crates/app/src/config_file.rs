@@ -197,7 +197,7 @@ impl ConfigFile {
         Ok(OuterSettings { input, limits, output: pipeline.config().table("output")? })
     }
 
-    /// Returns a note for each list that replaces an inherited one whole: who meant to change one
+    /// Returns a note for each list that replaces an inherited one whole: a reader who meant to change one
     /// setting loses all others.
     ///
     /// # Errors

@@ -162,7 +162,7 @@ pub fn text(store: &Store, benchmark: &Benchmark) -> String {
     out
 }
 
-/// Returns the table of the figures in the image, and that of the logs whose truth has places alone.
+/// Returns the table of the figures in the image, and that of the logs with places alone as truth.
 fn tables(tasks: &[TaskResult]) -> String {
     let is_brief = tasks.iter().filter(|task| is_skipped(task)).count() > MOST_REASONS;
     let shown = tasks.iter().filter(|task| !is_brief || !is_skipped(task));

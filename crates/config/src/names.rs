@@ -52,6 +52,41 @@ pub fn model_hint(missing: &Path, others: &[String]) -> String {
     format!("; did you mean `{name}`?")
 }
 
+/// Most names that are listed behind a suggestion.
+const MOST_NAMES: usize = 8;
+
+/// Puts "did you mean" into serde's "unknown field `a`, expected one of `b`, `c`", before the names,
+/// or in the place of many names.
+pub(crate) fn with_suggestion(message: &str) -> String {
+    let mut quoted = message.split('`').skip(1).step_by(2);
+    // The unknown name is quoted first, then the valid ones.
+    let unknown = if message.starts_with("unknown ") { quoted.next() } else { None };
+    let names: Vec<&str> = quoted.collect();
+    let better = unknown.and_then(|name| nearest_key(name, &names));
+    match (better, message.split_once("`, expected ")) {
+        (Some(better), Some((wrong, expected))) => {
+            let list = if names.len() > MOST_NAMES {
+                String::new()
+            } else {
+                format!(" expected {expected}")
+            };
+            format!("{wrong}`; did you mean `{better}`?{list}")
+        }
+        (Some(better), None) => format!("{message}; did you mean `{better}`?"),
+        (None, _) => message.to_owned(),
+    }
+}
+
+/// Returns the nearest key, or the first with a near first word: `color_topic` for `colour`.
+fn nearest_key<'a>(wanted: &str, keys: &[&'a str]) -> Option<&'a str> {
+    if let Some(key) = nearest(wanted, keys.iter().copied()) {
+        return Some(key);
+    }
+    let words = keys.iter().filter_map(|key| Some(key.split_once('_')?.0));
+    let word = nearest(wanted, words)?;
+    keys.iter().copied().find(|key| key.split_once('_').is_some_and(|(first, _)| first == word))
+}
+
 /// Computes the Levenshtein distance, one row at a time.
 fn edit_distance(a: &str, b: &str) -> usize {
     let b: Vec<char> = b.chars().collect();
@@ -71,6 +106,19 @@ fn edit_distance(a: &str, b: &str) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_first_word_suggests_its_key_and_many_names_are_not_listed() {
+        let few = with_suggestion("unknown field `colour`, expected one of `color_topic`, `size`");
+        let expected = "unknown field `colour`; did you mean `color_topic`? expected one of";
+        assert!(few.starts_with(expected), "{few}");
+        let names: Vec<String> = (0..9).map(|at| format!("`other{at}`")).collect();
+        let many =
+            format!("unknown field `dept`, expected one of `depth_topic`, {}", names.join(", "));
+        assert_eq!(with_suggestion(&many), "unknown field `dept`; did you mean `depth_topic`?");
+        let none = "unknown field `zebra`, expected one of `color_topic`, `size`";
+        assert_eq!(with_suggestion(none), none);
+    }
 
     #[test]
     fn names_are_as_far_apart_as_letters_have_to_be_changed() {

@@ -53,7 +53,7 @@ impl World {
         Self { head, kind: 1.0, passer: None, shadow: 0..0, at_s: 1.0 }
     }
 
-    /// Returns whether somebody who passes covers a column.
+    /// Returns true if a passing person covers a column.
     fn is_passed(&self, x: usize) -> bool {
         self.passer.is_some_and(|(from, to)| (from..to).contains(&x))
     }

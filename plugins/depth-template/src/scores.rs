@@ -217,7 +217,7 @@ mod tests {
     fn a_pixel_speaks_for_the_person_at_its_depth_and_against_one_in_front_of_it() {
         let one = f64::from(ONE);
         assert!(f64::from(verdict(2.0, 2.0).covered) > 0.9 * one);
-        // One looks past a person who is not there; something nearer hides the person.
+        // Depth beyond the place shows nobody there; a nearer surface hides the person.
         for (seen_m, expected) in [(5.0, -1.0), (1.0, 0.0), (f32::NAN, 0.0)] {
             assert_eq!(f64::from(verdict(2.0, seen_m).covered) / one, expected, "{seen_m}");
         }

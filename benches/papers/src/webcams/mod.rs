@@ -133,7 +133,7 @@ fn guess(path: &Path) -> Result<Vec<WebcamSettings>, Failure> {
     Ok(guess.webcams)
 }
 
-/// Returns the failure of a command whose file is wrong.
+/// Returns the failure of a command with a wrong file.
 fn failure_of(path: &Path, why: impl std::fmt::Display) -> Failure {
     Failure::usage(format!("{}: {why}", path.display()))
 }

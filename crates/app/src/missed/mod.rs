@@ -204,7 +204,7 @@ impl Witness {
 
     /// Returns the candidate that came nearest to a track: one of the person's size before one that
     /// merely overlaps the person, then by the test that it failed, the last one first, then by the
-    /// distance. Second detections of other people who are found are left out.
+    /// distance. Second detections of other people are left out.
     fn best_dropped(
         &self,
         number: u64,

@@ -1,4 +1,4 @@
-//! What a run says about each frame: dropped candidates, tracks, and depth.
+//! The record of each frame of a run: dropped candidates, tracks, and depth.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -83,7 +83,7 @@ struct Sight {
     depths: Option<Depths>,
 }
 
-/// What a run says about each frame, by its number.
+/// The record of each frame of a run, by its number.
 #[derive(Clone, Debug, Default)]
 pub struct Witness {
     tests: Vec<String>,

@@ -246,7 +246,7 @@ mod tests {
         assert!(lost.ends_with("1 moments have no image and are left out"), "{lost}");
     }
 
-    /// The one note on a truth whose moments have these stamps.
+    /// The one note on a truth with moments of these stamps.
     fn note_of_stamps(stamps: &[u64]) -> String {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("walk.truth.jsonl");

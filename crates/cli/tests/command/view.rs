@@ -45,9 +45,10 @@ fn a_page_has_the_frames_the_images_and_the_candidates() {
     assert_eq!(last["tracks"][0]["state"], "seen");
     assert!(last["found"][0]["track"].is_u64(), "{last}");
     assert_eq!(page["runs"][0]["events"][0]["kind"], "started");
-    // The page is not replaced unasked, and shows a part where that is asked.
-    assert_eq!(code(&view(home.path(), &["one"])), 2);
-    let part = view(home.path(), &["one", "--overwrite", "--from", "0.5", "--to", "1.0"]);
+    // The page of the run is made anew, and shows a part where that is asked; a file of another name
+    // is not replaced unasked.
+    assert_eq!(code(&view(home.path(), &["one", "-o", "one/view.html"])), 2);
+    let part = view(home.path(), &["one", "--from", "0.5", "--to", "1.0"]);
     assert_eq!(code(&part), 0, "{}", text(&part.stderr));
     assert!(!text(&part.stdout).contains("20 frames"), "{}", text(&part.stdout));
 }

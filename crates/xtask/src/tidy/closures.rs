@@ -2,7 +2,7 @@ use anyhow::Result;
 
 use crate::workspace::Workspace;
 
-/// Folders whose sources are counted.
+/// Folders with the sources that are counted.
 const FOLDERS: &[&str] = &["crates", "plugins", "benches", "bridges", "examples"];
 
 /// Most closures bound by `let` in 1,000 lines.
