@@ -53,7 +53,7 @@ impl Command {
         if self.told_twist() == Twist::STOP { "stands" } else { self.reason.effect() }
     }
 
-    /// Returns one sentence for a person who watches the robot: [`Reason::about`], with what the robot
+    /// Returns one sentence for an operator of the robot: [`Reason::about`], with what the robot
     /// does by this command.
     pub fn about(&self) -> String {
         let about = self.reason.about();
@@ -158,7 +158,7 @@ impl Reason {
         }
     }
 
-    /// Returns one sentence for a person who watches the robot.
+    /// Returns one sentence for an operator of the robot.
     pub fn about(self) -> &'static str {
         match self {
             Self::Follow => "drives as the controller asks",

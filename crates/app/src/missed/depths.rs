@@ -50,8 +50,8 @@ impl Depths {
         Self { cells, camera: Arc::clone(camera) }
     }
 
-    /// Returns the name and the sentence of a cause that can be measured at a person for whom no
-    /// candidate was proposed. `None` if there is none, and where a detector needs no depth.
+    /// Returns the name and the sentence of a cause that can be measured at a person without any
+    /// candidate. `None` if there is none, and where a detector needs no depth.
     pub(super) fn cause(&self, person: &Rect, rules: Rules<'_>) -> Option<(&'static str, String)> {
         // A detector without such a limit looks at other things than depth.
         let least_m = limit(rules, "min_depth_m", f64::min)?;

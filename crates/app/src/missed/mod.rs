@@ -28,7 +28,7 @@ const NOT_CONFIRMED: &str = "track: not confirmed";
 /// Time after which the track that was on a person is not told any more, ns.
 const RECENT_NS: i64 = 2_000_000_000;
 
-/// Returns true for a test that says something about the person at whose place it dropped a candidate.
+/// Returns true for a test that says something about the person where it dropped a candidate.
 pub fn is_telling(test: &str) -> bool {
     test != NOT_BEST
 }

@@ -12,8 +12,8 @@ const OTHER_ENDINGS: [&str; 3] = [".jsonl", ".mcap", ".bag"];
 const BEYOND: u32 = 5;
 /// Part of the boxes that lie outside of the image, by their middles, from which on it is another image.
 const OUTSIDE: f64 = 0.2;
-/// Part of the annotated people of whom fewer are matched if the truth is that of another log: by chance a
-/// few of their boxes lie on tracks.
+/// Share of the annotated people below which the truth may be that of another log: by chance a few of
+/// its boxes lie on tracks.
 const BY_CHANCE: f64 = 0.1;
 
 /// Returns the notes on a truth beside the frames of a log: the signs that it is that of another one, and
@@ -29,8 +29,8 @@ pub fn truth_notes(
     notes
 }
 
-/// Returns the question that a truth raises of whose `people`, over all frames, tracks match only `matched`
-/// or none.
+/// Returns the question that a truth raises if tracks match only `matched` of its `people`, over all
+/// frames, or none.
 pub fn match_note(path: &Path, people: u64, matched: u64, reports: u64) -> Option<String> {
     if reports == 0 || matched as f64 >= BY_CHANCE * people as f64 {
         return None;

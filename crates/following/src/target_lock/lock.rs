@@ -63,7 +63,7 @@ impl LockState {
         }
     }
 
-    /// Returns one sentence for a person who watches the robot.
+    /// Returns one sentence for an operator of the robot.
     pub fn about(self) -> &'static str {
         match self {
             Self::Initial => "no person was chosen yet",

@@ -98,7 +98,7 @@ impl Scans {
     }
 }
 
-/// Returns a scan in the frame of a robot whose poses at other times `robot_from` gives. Each point
+/// Returns a scan in the frame of a robot; `robot_from` gives its poses at other times. Each point
 /// moves with the robot since the time of its own ray.
 pub(crate) fn seen_from(
     scan: &LaserScan,
