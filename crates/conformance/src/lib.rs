@@ -26,6 +26,7 @@ mod general;
 mod likelihoods;
 mod managers;
 pub mod patch;
+pub mod pattern;
 pub mod samples;
 mod scenes;
 mod subject;

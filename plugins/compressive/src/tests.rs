@@ -3,6 +3,7 @@ use std::sync::Arc;
 use nalgebra::{Point3, SMatrix, Vector2};
 use proptest::prelude::*;
 use tagalong_config::Registry;
+use tagalong_conformance::pattern::{blotches, part_of_box};
 use tagalong_core::{
     DepthImage, Detection, Detector, EgoMotion, Estimate, Frame, Funnel, GreyImage, Images, Person,
     Query, Stamp, Track, TrackId,
@@ -18,20 +19,6 @@ const SIZE: (usize, usize) = (320, 240);
 fn camera() -> Arc<Camera> {
     let lens = Pinhole { fx: 262.0, fy: 262.0, cx: 159.5, cy: 119.5, distortion: Distortion::None };
     Arc::new(Camera::mounted(lens, SIZE.0, SIZE.1, 1.3, 0.0, 0.0))
-}
-
-/// A reproducible pattern of blotches, 0 to 255.
-fn pattern(u: f64, v: f64, kind: f64) -> f64 {
-    let [first, second, third] =
-        [[9.0, 2.0], [-4.0, 7.0 + kind], [15.0, -11.0]].map(|[a, b]| (a * u + b * v + kind).sin());
-    127.0 + 60.0 * first + 40.0 * second + 25.0 * third
-}
-
-/// Returns the place of a pixel in a box, 0 to 1 along each side, if it lies in it.
-fn part_of_box(region: &Rect, x: usize, y: usize) -> Option<(f64, f64)> {
-    let u = (x as f64 + 0.5 - region.x) / region.width;
-    let v = (y as f64 + 0.5 - region.y) / region.height;
-    ((0.0..1.0).contains(&u) && (0.0..1.0).contains(&v)).then_some((u, v))
 }
 
 /// A person as a patterned square, 0.57 m wide, at a place; and the objects in front.
@@ -58,9 +45,9 @@ impl World {
         let face_m = (camera.depth_of(&self.head) - HEAD_RADIUS_M) as f32;
         let grey = GreyImage::from_fn(SIZE.0, SIZE.1, |x, y| {
             let value = match (self.board_depth(x), part_of_box(&region, x, y)) {
-                (Some(_), _) => pattern(x as f64 / 40.0, y as f64 / 40.0, 8.0),
-                (None, Some((u, v))) => pattern(u, v, 1.0),
-                (None, None) => pattern(x as f64 / 90.0, y as f64 / 90.0, 4.0),
+                (Some(_), _) => blotches(x as f64 / 40.0, y as f64 / 40.0, 8.0),
+                (None, Some((u, v))) => blotches(u, v, 1.0),
+                (None, None) => blotches(x as f64 / 90.0, y as f64 / 90.0, 4.0),
             };
             value.clamp(0.0, 255.0) as u8
         });

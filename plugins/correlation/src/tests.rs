@@ -3,6 +3,7 @@ use std::sync::Arc;
 use nalgebra::{Point2, Point3, SMatrix, Vector2};
 use proptest::prelude::*;
 use tagalong_config::Registry;
+use tagalong_conformance::pattern::{blotches, part_of_box};
 use tagalong_core::{
     DepthImage, Detection, Detector, EgoMotion, Estimate, Frame, Funnel, GreyImage, Images, Person,
     Query, Stamp, Track, TrackId,
@@ -19,20 +20,6 @@ const SIZE: (usize, usize) = (320, 240);
 fn camera() -> Arc<Camera> {
     let lens = Pinhole { fx: 215.0, fy: 215.0, cx: 160.0, cy: 120.0, distortion: Distortion::None };
     Arc::new(Camera::mounted(lens, SIZE.0, SIZE.1, 1.3, 0.0, 0.0))
-}
-
-/// A reproducible pattern of blotches.
-fn pattern(u: f64, v: f64, kind: f64) -> f64 {
-    let [first, second, third] =
-        [[9.0, 2.0], [-4.0, 7.0 + kind], [15.0, -11.0]].map(|[a, b]| (a * u + b * v + kind).sin());
-    127.0 + 60.0 * first + 40.0 * second + 25.0 * third
-}
-
-/// Returns the place of a pixel in a box, 0 to 1 along each side, if it lies in it.
-fn part_of_box(region: &Rect, x: usize, y: usize) -> Option<(f64, f64)> {
-    let u = (x as f64 + 0.5 - region.x) / region.width;
-    let v = (y as f64 + 0.5 - region.y) / region.height;
-    ((0.0..1.0).contains(&u) && (0.0..1.0).contains(&v)).then_some((u, v))
 }
 
 /// A person as a patterned square, and a passer-by in front of the camera.
@@ -64,9 +51,9 @@ impl World {
         let face_m = (camera.depth_of(&self.head) - HEAD_RADIUS_M) as f32;
         let grey = GreyImage::from_fn(SIZE.0, SIZE.1, |x, y| {
             let value = match part_of_box(&region, x, y) {
-                _ if self.is_passed(x) => pattern(x as f64 / 40.0, y as f64 / 40.0, 8.0),
-                Some((u, v)) => pattern(u, v, self.kind),
-                None => pattern(x as f64 / 90.0, y as f64 / 90.0, 4.0),
+                _ if self.is_passed(x) => blotches(x as f64 / 40.0, y as f64 / 40.0, 8.0),
+                Some((u, v)) => blotches(u, v, self.kind),
+                None => blotches(x as f64 / 90.0, y as f64 / 90.0, 4.0),
             };
             value.clamp(0.0, 255.0) as u8
         });
@@ -228,7 +215,7 @@ proptest! {
     ) {
         let grey = GreyImage::from_fn(SIZE.0, SIZE.1, |x, y| {
             // Brighter than the middle, so that the means count.
-            (100.0 + 0.5 * pattern(x as f64 / 30.0, y as f64 / 30.0, seed)).clamp(0.0, 255.0) as u8
+            (100.0 + 0.5 * blotches(x as f64 / 30.0, y as f64 / 30.0, seed)).clamp(0.0, 255.0) as u8
         });
         let depth = DepthImage::from_fn(SIZE.0, SIZE.1, |x, y| match (x * 7 + y * 13) % holes {
             0 => f32::NAN,
@@ -244,7 +231,7 @@ proptest! {
         let body: [f32; CELLS] = std::array::from_fn(|i| f32::from(i % holes != 1));
         let count = body.iter().sum();
         let grey = std::array::from_fn(|i| {
-            pattern((i % SIDE) as f64 / 6.0, (i / SIDE) as f64 / 9.0, seed) as f32 - 100.0
+            blotches((i % SIDE) as f64 / 6.0, (i / SIDE) as f64 / 9.0, seed) as f32 - 100.0
         });
         let picture = Picture { grey, body, count };
         let cells = strip.cells();
