@@ -242,9 +242,12 @@ pub fn assign_fits(
     at_gate: f64,
     miss_factor: f64,
 ) -> Vec<Option<usize>> {
-    let volumes: Vec<f64> = fits.iter().flatten().flatten().map(|f| f.log_volume).collect();
-    let least = volumes.iter().copied().fold(f64::INFINITY, f64::min);
-    let most = volumes.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let mut least = f64::INFINITY;
+    let mut most = f64::NEG_INFINITY;
+    for fit in fits.iter().flatten().flatten() {
+        least = least.min(fit.log_volume);
+        most = most.max(fit.log_volume);
+    }
     // With the range of ln |S| added, no pair within the gate costs more than a miss at factor 1.
     let range = if most > least { most - least } else { 0.0 };
     let miss = miss_factor * at_gate + range;

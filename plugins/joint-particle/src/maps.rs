@@ -186,10 +186,14 @@ impl Grid {
 
     /// Returns all places, ordered by that of the near person.
     pub fn places(&self) -> Vec<PositionPair> {
-        let [near, far] = [0, 1].map(|axis| -> Vec<f64> {
-            (0..self.sides[axis]).map(|i| i as f64 * self.step - self.reach[axis]).collect()
-        });
-        near.iter().flat_map(|near| far.iter().map(move |far| [*near, *far])).collect()
+        let mut places = Vec::with_capacity(self.sides[0] * self.sides[1]);
+        for row in 0..self.sides[0] {
+            let near = row as f64 * self.step - self.reach[0];
+            for column in 0..self.sides[1] {
+                places.push([near, column as f64 * self.step - self.reach[1]]);
+            }
+        }
+        places
     }
 
     /// Returns the number of places of the far person for each of the near one.

@@ -80,11 +80,13 @@ impl Blob {
         }
 
         let width = counts.columns.len();
-        let heights: Vec<f64> = counts.columns.iter().map(|count| f64::from(*count)).collect();
-        let fullest = run.columns(width).map(|column| heights[column]).fold(0.0, f64::max);
+        let fullest =
+            run.columns(width).map(|column| pixels_of(counts, column)).fold(0.0, f64::max);
         // Bottom and top come from the core: an arm or a remnant of a shadow would shift them.
-        let core: Vec<usize> =
-            run.columns(width).filter(|column| heights[*column] >= CORE * fullest).collect();
+        let core: Vec<usize> = run
+            .columns(width)
+            .filter(|column| pixels_of(counts, *column) >= CORE * fullest)
+            .collect();
         let rows: Vec<u32> = counts
             .solid
             .chunks_exact(width)
@@ -96,7 +98,7 @@ impl Blob {
         let features = Features {
             width: run.length as f64,
             bottom: (rows.len() - 1 - lowest) as f64,
-            pixels: run.columns(width).map(|column| heights[column]).sum(),
+            pixels: run.columns(width).map(|column| pixels_of(counts, column)).sum(),
             top: top as f64,
             middle,
             core: core.len() as f64,
@@ -104,9 +106,14 @@ impl Blob {
         };
         let upper = top..(middle as usize + 1).min(rows.len());
         let colour = mean_colour(&core, upper, counts, colours);
-        let column = mean(&run, width, |column| heights[column]);
+        let column = mean(&run, width, |column| pixels_of(counts, column));
         Some(Self { run, column, features, colour, visible: 1.0 })
     }
+}
+
+/// Returns the number of pixels of a column where a person may be.
+fn pixels_of(counts: &Counts, column: usize) -> f64 {
+    f64::from(counts.columns[column])
 }
 
 /// Returns the row above which this part of the pixels lies, interpolated between rows.

@@ -71,28 +71,29 @@ fn block_depth(surface: &Surface, block: usize) -> f32 {
 /// Computes the distance of the candidate's surface from the plane that fits it best, m (root mean
 /// square): zero for posters and cardboard.
 fn unevenness(surface: &Surface, zone: Zone) -> f32 {
-    let points: Vec<(Vector3<f32>, f32)> = zone
-        .cells()
-        .filter(|cell| surface.is_on(*cell))
-        .map(|cell| {
-            let place = Vector3::new((cell % SIDE) as f32 - 15.5, (cell / SIDE) as f32 - 15.5, 1.0);
-            (place / 16.0, surface.0[cell])
-        })
-        .collect();
     // A plane has three parameters; fewer points than 8 fit it by chance.
-    if points.len() < 8 {
+    if points_on(surface, zone).count() < 8 {
         return f32::NAN;
     }
     let mut squares = Matrix3::zeros();
     let mut sums = Vector3::zeros();
-    for (place, depth) in &points {
+    for (place, depth) in points_on(surface, zone) {
         squares += place * place.transpose();
-        sums += place * *depth;
+        sums += place * depth;
     }
     let Some(inverse) = squares.try_inverse() else { return f32::NAN };
     let plane = inverse * sums;
-    let [mean, deviation] = spread(points.iter().map(|(place, depth)| depth - plane.dot(place)));
+    let off = points_on(surface, zone).map(|(place, depth)| depth - plane.dot(&place));
+    let [mean, deviation] = spread(off);
     mean.hypot(deviation)
+}
+
+/// Returns the places in the window and the depths of the cells on the candidate.
+fn points_on(surface: &Surface, zone: Zone) -> impl Iterator<Item = (Vector3<f32>, f32)> {
+    zone.cells().filter(|cell| surface.is_on(*cell)).map(|cell| {
+        let place = Vector3::new((cell % SIDE) as f32 - 15.5, (cell / SIDE) as f32 - 15.5, 1.0);
+        (place / 16.0, surface.0[cell])
+    })
 }
 
 /// Computes the depth of the ends of the runs behind their middles, m: heads are round.
@@ -113,15 +114,13 @@ fn roundness(surface: &Surface, zone: Zone) -> f32 {
 /// Mean bend between neighbours on the candidate, m: leaves are rough.
 fn roughness(surface: &Surface, zone: Zone) -> f32 {
     let inner = Zone { columns: [zone.columns[0] + 1, zone.columns[1] - 1], ..zone };
-    let mut bends = Vec::new();
-    for cell in inner.cells() {
-        // A bend over an edge of the candidate is that of the background.
-        if (cell - 1..=cell + 1).all(|cell| surface.is_on(cell)) {
-            let [left, here, right] = [cell - 1, cell, cell + 1].map(|cell| surface.0[cell]);
-            bends.push((left - 2.0 * here + right).abs());
-        }
-    }
-    spread(bends.into_iter())[0]
+    // A bend over an edge of the candidate is that of the background.
+    let on = inner.cells().filter(|cell| (cell - 1..=cell + 1).all(|cell| surface.is_on(cell)));
+    let bends = on.map(|cell| {
+        let [left, here, right] = [cell - 1, cell, cell + 1].map(|cell| surface.0[cell]);
+        (left - 2.0 * here + right).abs()
+    });
+    spread(bends)[0]
 }
 
 /// Parts of the window without a reading, on the candidate, nearer.
