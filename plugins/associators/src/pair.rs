@@ -298,19 +298,25 @@ mod tests {
     fn the_smaller_cost_counts_in_the_unit_of_the_cost() {
         let fit = Fit { cost: 3.0, log_volume: -1.0 };
         let even = 0.5_f64.ln();
-        for (cost, gate, log_ratio, expected) in [
-            (Cost::Mahalanobis, 0.2, 1e-9, -2.0 * even),
-            (Cost::Overlap, 0.04, 1e-9, -even),
-            // Too far away.
-            (Cost::Mahalanobis, 0.3, 4.0, 3.0),
-            (Cost::Overlap, 0.06, 4.0, 3.0),
-            // It never speaks against a pair.
-            (Cost::Mahalanobis, 0.0, -4.0, 3.0),
-        ] {
-            let fusion = AppearanceFusion { fusion: Fusion::Minimum, gate };
-            let found = PairCost { cost, fusion, ..DEFAULT }.with_appearance(fit, log_ratio).cost;
-            assert!((found - expected).abs() < 1e-6, "{cost:?} {gate} {log_ratio}: {found}");
+        for (cost, gate, expected) in
+            [(Cost::Mahalanobis, 0.2, -2.0 * even), (Cost::Overlap, 0.04, -even)]
+        {
+            let found = cost_with(fit, cost, gate, 1e-9);
+            assert!((found - expected).abs() < 1e-6, "{cost:?}: {found}");
         }
+        for (cost, gate, log_ratio, why) in [
+            (Cost::Mahalanobis, 0.3, 4.0, "too far away"),
+            (Cost::Overlap, 0.06, 4.0, "too far away"),
+            (Cost::Mahalanobis, 0.0, -4.0, "it never speaks against a pair"),
+        ] {
+            assert_eq!(cost_with(fit, cost, gate, log_ratio), 3.0, "{cost:?}: {why}");
+        }
+    }
+
+    /// Returns the cost of a pair whose appearance has this log-likelihood ratio.
+    fn cost_with(fit: Fit, cost: Cost, gate: f64, log_ratio: f64) -> f64 {
+        let fusion = AppearanceFusion { fusion: Fusion::Minimum, gate };
+        PairCost { cost, fusion, ..DEFAULT }.with_appearance(fit, log_ratio).cost
     }
 
     /// Runs the assignment with the cost of a miss in multiples of the cost at the gate.
@@ -426,17 +432,18 @@ mod tests {
         let settings = PairCost { cost: Cost::Overlap, ..DEFAULT };
         let mut track = track(Point3::new(3.0, 0.0, 1.5), SMatrix::identity());
         track.estimate.region = Rect::new(0.0, 0.0, 10.0, 10.0);
-        // The last one has less than 0.3.
-        let [_, detection, _] =
-            [(0.0, Some(0.0)), (5.0, Some(3.0_f64.ln())), (5.5, None)].map(|(x, expected)| {
-                let region = Rect::new(x, 0.0, 10.0, 10.0);
-                let detection = detection_at(9.0, 9.0).with_image(ImageBox::upper_body(region));
-                let cost = settings.fit(&track, &detection, 0.1).map(|fit| fit.cost);
-                assert_eq!(cost.is_some(), expected.is_some(), "{x}");
-                let off = cost.unwrap_or_default() - expected.unwrap_or_default();
-                assert!(off.abs() < 1e-12, "{x}: {cost:?}");
-                detection
-            });
+        let [same, third, less] = [0.0, 5.0, 5.5].map(|x| {
+            let region = Rect::new(x, 0.0, 10.0, 10.0);
+            detection_at(9.0, 9.0).with_image(ImageBox::upper_body(region))
+        });
+        let [of_same, of_third, of_less] = [&same, &third, &less]
+            .map(|detection| settings.fit(&track, detection, 0.1).map(|fit| fit.cost));
+        assert_eq!(of_same, Some(0.0));
+        let cost = of_third.expect("a third is enough");
+        assert!((cost - 3.0_f64.ln()).abs() < 1e-12, "a third: {cost}");
+        assert_eq!(of_less, None, "less than 0.3");
+        let detection = detection_at(3.0, 0.0)
+            .with_image(ImageBox::upper_body(Rect::new(5.0, 0.0, 10.0, 10.0)));
         for (miss_factor, expected) in [(1.0, Some(0)), (0.9, None)] {
             let tracks = std::slice::from_ref(&track);
             let seen = std::slice::from_ref(&detection);

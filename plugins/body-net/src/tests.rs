@@ -206,14 +206,10 @@ mod training {
             let log_odds = model.log_odds(&view, &mut pass);
             assert!((log_odds > 0.0) == (seed % 2 == 0), "{seed}: {log_odds}");
         }
-        for (name, range) in [
-            ("area_under_roc", 0.9..=1.0),
-            ("people_accepted", 0.8..=1.0),
-            ("others_accepted", 0.0..=0.2),
-        ] {
-            let figure = fitted.figures[name].as_float().unwrap();
-            assert!(range.contains(&figure), "{name}: {figure}");
-        }
+        let [area, people, others] = ["area_under_roc", "people_accepted", "others_accepted"]
+            .map(|name| fitted.figures[name].as_float().expect("a number"));
+        assert!((0.9..=1.0).contains(&area), "{:?}", fitted.figures);
+        assert!(people > 0.8 && others < 0.2, "{:?}", fitted.figures);
         assert!((0.05..50.0).contains(&model.slope), "{}", model.slope);
         for (name, expected) in [("people", 30), ("others", 30), ("without_depth", 1)] {
             assert_eq!(fitted.figures[name].as_integer(), Some(expected), "{name}");

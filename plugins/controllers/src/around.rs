@@ -193,6 +193,7 @@ mod tests {
     /// A camera 1 m above the floor that sees a board 1 m ahead, to the left.
     #[test]
     fn what_is_looked_at_replaces_what_was_remembered_there() {
+        /// Returns a board that ends at a column, before a wall.
         fn board_up_to(column: usize) -> DepthImage {
             DepthImage::from_fn(40, 30, |x, _| if x < column { 1.0 } else { 3.0 })
         }
@@ -203,21 +204,29 @@ mod tests {
         let mut around = NearestObstacles::new();
         let board_m = 1.0_f64.hypot(0.35);
         let low = [0.1, 1.5];
+        let unknown = DepthImage::filled(40, 30, f32::NAN);
         let wall = DepthImage::filled(40, 30, 1.0);
-        for (depth, heights, is_thing, expected_m, what) in [
-            (&board_up_to(10), low, true, board_m, "a board"),
-            (&board_up_to(0), low, true, 3.0, "the board is gone"),
-            (&board_up_to(10), low, true, board_m, "the board is back"),
-            (&DepthImage::filled(40, 30, f32::NAN), low, true, board_m, "nothing is seen"),
-            (&wall, [1.6, 1.9], true, 9.0, "overhead"),
-            (&wall, low, false, 9.0, "people"),
-        ] {
-            let mut look = Look::new();
-            look.add_depth(&camera, depth, heights, |_| is_thing);
-            around.add_look(&look);
-            let nearest_m = around.places().map(|at| at.coords.norm()).fold(9.0, f64::min);
-            assert!((nearest_m - expected_m).abs() < 0.1, "{what}: {nearest_m}");
-        }
+        let looks = [
+            (&board_up_to(10), low, true),
+            (&board_up_to(0), low, true),
+            (&board_up_to(10), low, true),
+            (&unknown, low, true),
+            (&wall, [1.6, 1.9], true),
+            (&wall, low, false),
+        ];
+        let [board, gone, back, unseen, overhead, people] =
+            looks.map(|(depth, heights, is_thing)| {
+                let mut look = Look::new();
+                look.add_depth(&camera, depth, heights, |_| is_thing);
+                around.add_look(&look);
+                around.places().map(|at| at.coords.norm()).fold(9.0, f64::min)
+            });
+        assert!((board - board_m).abs() < 0.1, "{board}");
+        assert!((gone - 3.0).abs() < 0.1, "the board is gone: {gone}");
+        assert!((back - board_m).abs() < 0.1, "{back}");
+        assert!((unseen - board_m).abs() < 0.1, "nothing is seen, so it is still there: {unseen}");
+        assert_eq!(overhead, 9.0, "overhead");
+        assert_eq!(people, 9.0, "people");
     }
 
     #[test]

@@ -77,16 +77,15 @@ mod tests {
         let mut hungarian = Hungarian::new(Config::default()).unwrap();
         let tracks = [0.1, -0.1].map(|y| track(3.0, y, 0.02));
         let seen = [detection_at(3.0, 0.11), detection_at(3.0, -0.11)];
-        for (appearance, expected) in [
-            (vec![], [0, 1]),
-            (vec![vec![-4.0, 4.0], vec![4.0, -4.0]], [1, 0]),
-            // Places still count.
-            (vec![vec![-0.1, 0.1], vec![0.1, -0.1]], [0, 1]),
+        for (appearance, expected, why) in [
+            (vec![], [0, 1], "places alone"),
+            (vec![vec![-4.0, 4.0], vec![4.0, -4.0]], [1, 0], "looks differ much"),
+            (vec![vec![-0.1, 0.1], vec![0.1, -0.1]], [0, 1], "places still count"),
         ] {
             let answer = hungarian.associate(&tracks, &seen, &GATE.with_appearance(&appearance));
             let given: Vec<_> =
                 pairs(&answer).into_iter().map(|(_, detection)| detection).collect();
-            assert_eq!(given, expected, "{appearance:?}");
+            assert_eq!(given, expected, "{why}");
         }
     }
 
@@ -101,18 +100,16 @@ mod tests {
         let tracks = [track_in(1, boxed(0.0)), track_in(2, boxed(2.0))];
         let seen = [1.0, 4.0].map(|x| detection_in(boxed(x)));
         let looks = [vec![-3.0, 6.0], vec![-3.0, -3.0]];
-        for (fusion, fusion_gate, expected) in [
-            (Fusion::Minimum, 0.5, vec![(0, 1), (1, 0)]),
-            // Too little overlap.
-            (Fusion::Minimum, 0.9, vec![(0, 0), (1, 1)]),
-            // Other looks speak against the second pair.
-            (Fusion::Sum, 0.5, vec![(0, 1)]),
+        for (fusion, fusion_gate, expected, why) in [
+            (Fusion::Minimum, 0.5, vec![(0, 1), (1, 0)], "the farther one looks like it"),
+            (Fusion::Minimum, 0.9, vec![(0, 0), (1, 1)], "too little overlap"),
+            (Fusion::Sum, 0.5, vec![(0, 1)], "other looks speak against the second pair"),
         ] {
             let gating = GateSettings { fusion, fusion_gate, ..GateSettings::default() };
             let config = Config { cost: Cost::Overlap, gating, ..Config::default() };
             let gate = GATE.with_appearance(&looks);
             let mut hungarian = Hungarian::new(config).unwrap();
-            assert_eq!(pairs(&hungarian.associate(&tracks, &seen, &gate)), expected);
+            assert_eq!(pairs(&hungarian.associate(&tracks, &seen, &gate)), expected, "{why}");
         }
     }
 

@@ -210,17 +210,17 @@ mod tests {
     fn directions_are_compared_as_the_paper_has_them() {
         let associator = walking(Config::default());
         // The direction is taken from the observation three frames ago, at x = 4.
-        for (x, y, expected) in [
-            (14.0, 0.0, 0.5),
-            (-6.0, 0.0, -0.5),
-            // Across.
-            (4.0, 10.0, 0.0),
-            // From where it was there is no direction.
-            (4.0, 0.0, 0.0),
+        let track = track_in(1, at(0.0, 0.0));
+        for (x, y, expected, way) in [
+            (14.0, 0.0, 0.5, "straight ahead"),
+            (-6.0, 0.0, -0.5, "straight behind"),
+            (4.0, 10.0, 0.0, "across"),
         ] {
-            let found = associator.consistency(&track_in(1, at(0.0, 0.0)), &at(x, y));
-            assert!((found - expected).abs() < 1e-9, "{x} {y}: {found}");
+            let found = associator.consistency(&track, &at(x, y));
+            assert!((found - expected).abs() < 1e-9, "{way}: {found}");
         }
+        let from_there = associator.consistency(&track, &at(4.0, 0.0));
+        assert_eq!(from_there, 0.0, "from where it was there is no direction");
         assert_eq!(associator.consistency(&track_in(2, at(0.0, 0.0)), &at(9.0, 0.0)), 0.0);
     }
 

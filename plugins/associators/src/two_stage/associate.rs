@@ -124,11 +124,10 @@ mod tests {
         let tracks = [track(1, 0.0), track(2, 0.2)];
         let found = [detection(0.13, 3.0), detection(0.07, 3.0)];
         let looks = [vec![4.0, -4.0], vec![-4.0, 4.0]];
-        for (appearance, fusion_gate, expected) in [
-            (&[][..], 0.0, [(0, 1), (1, 0)]),
-            (&looks, 0.0, [(0, 0), (1, 1)]),
-            // exp(-d²/2) is less than that.
-            (&looks, 0.95, [(0, 1), (1, 0)]),
+        for (appearance, fusion_gate, expected, why) in [
+            (&[][..], 0.0, [(0, 1), (1, 0)], "places alone"),
+            (&looks, 0.0, [(0, 0), (1, 1)], "with looks"),
+            (&looks, 0.95, [(0, 1), (1, 0)], "exp(-d²/2) is less than that"),
         ] {
             let fusion = Fusion::Minimum;
             let gating = GateSettings { fusion, fusion_gate, ..GateSettings::default() };
@@ -136,7 +135,7 @@ mod tests {
             let config = Config { pairs: settings, ..Config::default() };
             let gate = GATE.with_appearance(appearance);
             let answer = TwoStage::new(config).unwrap().associate(&tracks, &found, &gate);
-            assert_eq!(pairs(&answer), expected);
+            assert_eq!(pairs(&answer), expected, "{why}");
         }
     }
 
