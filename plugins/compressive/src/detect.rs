@@ -180,22 +180,32 @@ fn sample(
     let Scratch { numbers, person, other, .. } = scratch;
     let width = of.width as f64;
     let radius = (config.positive_radius * width).max(2.0);
-    let mut near = disc(radius, (radius / 4.0).round() as i64);
-    let mut away = ring(config.negative_from * width, config.negative_to * width, config.negatives);
+    let near = disc(radius, (radius / 4.0).round() as i64);
+    let away = ring(config.negative_from * width, config.negative_to * width, config.negatives);
     person.clear(numbers.len());
     other.clear(numbers.len());
-    let near: &mut dyn Iterator<Item = (i64, i64)> = &mut near;
-    for (samples, offsets) in [(&mut *person, near), (&mut *other, &mut away)] {
-        for (dx, dy) in offsets {
-            let x = of.x + dx;
-            let y = of.y + dy;
-            if target.scaled.fits(&view.integral, x, y) {
-                target.scaled.measure(&view.integral, x as usize, y as usize, numbers);
-                samples.add(numbers);
-            }
+    add_samples(view, target, of, near, numbers, person);
+    add_samples(view, target, of, away, numbers, other);
+    person.len() >= 4 && other.len() >= 4
+}
+
+/// Adds the numbers of the boxes at some offsets from another one, where they lie in the image.
+fn add_samples(
+    view: &FrameImages<'_>,
+    target: &Target,
+    of: Pixels,
+    offsets: impl Iterator<Item = (i64, i64)>,
+    numbers: &mut [f32],
+    samples: &mut Samples,
+) {
+    for (dx, dy) in offsets {
+        let x = of.x + dx;
+        let y = of.y + dy;
+        if target.scaled.fits(&view.integral, x, y) {
+            target.scaled.measure(&view.integral, x as usize, y as usize, numbers);
+            samples.add(numbers);
         }
     }
-    person.len() >= 4 && other.len() >= 4
 }
 
 impl Target {

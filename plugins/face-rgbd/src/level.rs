@@ -118,9 +118,8 @@ impl Level {
                 let left = if x == 0 { before[0] } else { above[x - 1] };
                 let right = if x == width { before[width] } else { above[x + 1] };
                 let upper = left.wrapping_add(right).wrapping_sub(before[x]);
-                row[x] = [1, 2].into_iter().fold(upper, |sum, up| {
-                    sum.wrapping_add(pixel_above(&self.pixels, width, [x, y], up))
-                });
+                let [first, second] = [1, 2].map(|up| pixel_above(&self.pixels, width, [x, y], up));
+                row[x] = upper.wrapping_add(first).wrapping_add(second);
             }
             for (x, sum) in row.iter().enumerate() {
                 let at = self.tilted_offset(x, y);

@@ -39,19 +39,18 @@ fn flat(questions: &[Question]) -> Tree {
         if let Next::Leaf(value) = next { *value } else { 0.0 }
     }
 
-    let mut tree = Tree::default();
-    let mut asked = vec![(0, &questions[0])];
-    for (side, next) in questions[0].next.iter().enumerate() {
-        if let Next::Question(to) = next {
-            asked.push((1 + side, &questions[*to]));
-        }
-    }
-    for (at, question) in asked {
+    fn put_question(tree: &mut Tree, at: usize, question: &Question) {
         (tree.numbers[at], tree.below[at]) = (question.feature as u16, question.below);
     }
+
+    let mut tree = Tree::default();
+    put_question(&mut tree, 0, &questions[0]);
     for (side, next) in questions[0].next.iter().enumerate() {
         let pair = match next {
-            Next::Question(to) => questions[*to].next.map(|next| leaf(&next)),
+            Next::Question(to) => {
+                put_question(&mut tree, 1 + side, &questions[*to]);
+                questions[*to].next.map(|next| leaf(&next))
+            }
             end => [leaf(end); 2],
         };
         tree.values[2 * side..2 * side + 2].copy_from_slice(&pair);
