@@ -217,7 +217,7 @@ mod tests {
     use crate::bank::{Bank, Direction, Pose};
 
     /// Returns the readings among some pixels.
-    fn readings(pixels: &[Option<u16>]) -> Vec<f64> {
+    fn readings_among(pixels: &[Option<u16>]) -> Vec<f64> {
         pixels.iter().flatten().filter(|value| **value > 0).map(|value| f64::from(*value)).collect()
     }
 
@@ -247,7 +247,7 @@ mod tests {
                 let columns = window.clone().filter(|u| part.contains(u));
                 columns.map(|u| rows.value(u, y + row.dy)).collect()
             });
-            let fg = readings(&person_pixels);
+            let fg = readings_among(&person_pixels);
             person += person_pixels.len() as f64;
             seen += fg.len() as f64;
             let e = units / (z + row.relief_m).max(0.1);
@@ -266,7 +266,7 @@ mod tests {
                         Some(_) => 0.0,
                     };
                 }
-                let bg = readings(&side);
+                let bg = readings_among(&side);
                 if bg.is_empty() {
                     continue;
                 }

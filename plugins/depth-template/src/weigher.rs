@@ -126,10 +126,13 @@ impl Weigher {
             logs.push(match scene {
                 [] => 0.0,
                 [_] => {
-                    let ways = Direction::ALL.map(|way| tools.cast(scene, Some(way), frame, &view));
-                    ways.iter().map(|cast| likelihood.log_likelihood(cast)).fold(f64::MIN, f64::max)
+                    let ways = Direction::ALL.map(|way| {
+                        let cast = tools.placed_people(scene, Some(way), frame, &view);
+                        likelihood.log_likelihood(&cast)
+                    });
+                    ways.into_iter().fold(f64::MIN, f64::max)
                 }
-                _ => likelihood.log_likelihood(&tools.cast(scene, None, frame, &view)),
+                _ => likelihood.log_likelihood(&tools.placed_people(scene, None, frame, &view)),
             });
         }
         Ok(logs)
@@ -202,7 +205,7 @@ impl Likelihood for Weigher {
 impl Tools {
     /// Places the people of a scene, the nearest first; where no `way` is given, each faces where
     /// it moves.
-    fn cast(
+    fn placed_people(
         &mut self,
         scene: &[Person],
         way: Option<Direction>,

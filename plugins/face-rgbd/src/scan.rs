@@ -106,8 +106,8 @@ impl Scanner {
         let step = if scale >= FINE_FROM { 1 } else { 2 };
         let size =
             [image.width(), image.height()].map(|length| rounded(length as f64 / scale) as usize);
-        let columns = starts(area.x..area.right(), size[0], cascade.width, scale, step);
-        let rows = starts(area.y..area.bottom(), size[1], cascade.height, scale, step);
+        let columns = ends_of_places(area.x..area.right(), size[0], cascade.width, scale, step);
+        let rows = ends_of_places(area.y..area.bottom(), size[1], cascade.height, scale, step);
         let (Some((left, right)), Some((top, bottom))) = (columns, rows) else { return };
         let part = Part {
             x: left,
@@ -137,7 +137,7 @@ impl Scanner {
 
 /// Returns the first and the last place, in pixels of the shrunk image, of a window along an axis
 /// of this length, with its middle in a range of the image.
-fn starts(
+fn ends_of_places(
     range: Range<f64>,
     length: usize,
     window: usize,

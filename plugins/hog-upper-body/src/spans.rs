@@ -39,15 +39,15 @@ impl Spans {
     }
 
     /// Returns the columns of cells in a row of cells, none outside.
-    fn row(&self, index: usize) -> Range<usize> {
+    fn cells_in_row(&self, index: usize) -> Range<usize> {
         self.0.get(index).cloned().unwrap_or_default()
     }
 
     /// Returns the columns of pixels in the `index`th 8 rows of pixels: those of the cells there
     /// and in the row above, and one more on each side.
     pub(crate) fn pixels(&self, index: usize) -> Range<usize> {
-        let above = index.checked_sub(1).map_or(0..0, |above| self.row(above));
-        let cells = union(&above, &self.row(index));
+        let above = index.checked_sub(1).map_or(0..0, |above| self.cells_in_row(above));
+        let cells = union(&above, &self.cells_in_row(index));
         if cells.is_empty() { 0..0 } else { cells.start * CELL..cells.end * CELL + 2 }
     }
 }

@@ -359,16 +359,16 @@ pub fn model(
     for sample in samples.iter().filter(|sample| sample.person < STRANGERS) {
         people.entry(sample.person).or_default().push(*sample);
     }
-    let mut heads = Vec::with_capacity(people.len());
+    let mut known = Vec::with_capacity(people.len());
     let general = believed_head(samples, HeldOut::People, training, seed)?;
     for (id, own) in &people {
-        heads.push(Person {
+        known.push(Person {
             name: format!("person-{id}"),
             signature: signature(own),
             head: believed_head(own, HeldOut::Blocks, training, mix(seed ^ id))?,
         });
     }
-    Ok(Model { geometry, general, people: heads })
+    Ok(Model { geometry, general, people: known })
 }
 
 /// Fits a head, with standard deviations of held-out samples.

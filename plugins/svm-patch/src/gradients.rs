@@ -56,14 +56,14 @@ fn histograms(grey: &Patch) -> Patch {
 fn gradient(grey: &Patch, row: usize, column: usize) -> [f32; 2] {
     let [up, left] = [row, column].map(|at| at.saturating_sub(1));
     [
-        0.5 * (clamped(grey, row, column + 1) - clamped(grey, row, left)),
-        0.5 * (clamped(grey, row + 1, column) - clamped(grey, up, column)),
+        0.5 * (clamped_grey(grey, row, column + 1) - clamped_grey(grey, row, left)),
+        0.5 * (clamped_grey(grey, row + 1, column) - clamped_grey(grey, up, column)),
     ]
 }
 
 /// Returns a value, or the nearest one in the last row and column.
 #[inline]
-fn clamped(grey: &Patch, row: usize, column: usize) -> f32 {
+fn clamped_grey(grey: &Patch, row: usize, column: usize) -> f32 {
     grey[row.min(SIDE - 1) * SIDE + column.min(SIDE - 1)]
 }
 

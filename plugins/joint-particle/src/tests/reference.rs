@@ -162,18 +162,18 @@ impl Grid {
     }
 
     /// Returns the expected value of a function of the places of both people.
-    fn expected(&self, value: impl Fn(f64, f64) -> f64) -> f64 {
+    fn expected_value(&self, value: impl Fn(f64, f64) -> f64) -> f64 {
         let each = self.cells.iter().enumerate();
         each.map(|(n, cell)| cell * value(Self::at(n / SIDE), Self::at(n % SIDE))).sum()
     }
 
     /// Mean and standard deviation of the near and the far person.
     fn moments(&self) -> [(f64, f64); 2] {
-        let near = self.expected(|near, _| near);
-        let far = self.expected(|_, far| far);
+        let near = self.expected_value(|near, _| near);
+        let far = self.expected_value(|_, far| far);
         [
-            (near, self.expected(|at, _| (at - near).powi(2)).sqrt()),
-            (far, self.expected(|_, at| (at - far).powi(2)).sqrt()),
+            (near, self.expected_value(|at, _| (at - near).powi(2)).sqrt()),
+            (far, self.expected_value(|_, at| (at - far).powi(2)).sqrt()),
         ]
     }
 }
