@@ -270,7 +270,7 @@ mod tests {
             Config { min_side_px: 40.0, max_side: 0.5, scale_step: 1.5, ..Config::default() };
         let all: Vec<f64> = sides(&config, &camera(), None).collect();
         assert_eq!(all, [40.0, 60.0, 90.0, 135.0, 202.5], "up to half of 480 pixels");
-        // From 45.5 to 91, and so on.
+        // The first one from 45.5 to 91.
         for (width, expected) in [(65.0, &[60.0, 90.0][..]), (150.0, &[135.0, 202.5]), (20.0, &[])]
         {
             let region = Rect::new(10.0, 10.0, width, width);

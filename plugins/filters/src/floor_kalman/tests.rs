@@ -157,6 +157,7 @@ fn the_prediction_by_differences_is_as_uncertain_as_it_says() {
         uniform.sum::<f64>() - 6.0
     }
 
+    /// Returns a place with the noise of a sighting.
     fn noisy(at: Vector2<f64>, random: &mut u64) -> Vector2<f64> {
         at + Vector2::new(next_normal(random), next_normal(random)) * 0.02_f64.sqrt()
     }
