@@ -247,17 +247,17 @@ impl<'a> Sweep<'a> {
         let delays = [self.braking.reaction_s, self.braking.reaction_s + self.braking.rise_s];
         let [most, gentle] = delays.map(|delay_s| match hazard.kind {
             HazardKind::Still => self.speed_before(delay_s),
-            HazardKind::Moves(closing) => self.speed_beside(delay_s, |time_s| {
-                self.comes_m(closing, time_s) + self.settings.protective_m
-            }),
-            HazardKind::Followed(closing) => self.speed_beside(delay_s, |time_s| {
-                closing.max(0.0) * time_s + self.settings.followed_stop_m
-            }),
+            HazardKind::Moves(_) | HazardKind::Followed(_) => {
+                self.speed_beside(delay_s, |time_s| self.margin_within(hazard, time_s))
+            }
         });
-        let is_person = hazard.kind != HazardKind::Still;
-        let points = hazard.points;
-        let place = self.place(hazard);
-        (gentle < self.speed).then_some(Limit { gentle, most, points, is_person, place })
+        (gentle < self.speed).then(|| Limit {
+            gentle,
+            most,
+            points: hazard.points,
+            is_person: hazard.kind != HazardKind::Still,
+            place: self.place(hazard),
+        })
     }
 
     /// Returns the place of the hazard, the last that was measured, for the words of the command.
