@@ -144,11 +144,12 @@ mod tests {
 
     #[test]
     fn a_frozen_sensor_says_whether_a_reset_is_needed() {
-        fn told(needs_reset: bool) -> Cause {
-            Cause::Sensor { name: "the depth image".into(), needs_reset }
+        for (needs_reset, words) in [
+            (true, "the robot stands until a reset: check the sensor first"),
+            (false, "the robot stands until it delivers new readings"),
+        ] {
+            let cause = Cause::Sensor { name: "the depth image".into(), needs_reset };
+            assert_eq!(cause.to_string(), format!("the depth image; {words}"));
         }
-
-        assert!(told(true).to_string().contains("until a reset"));
-        assert!(!told(false).to_string().contains("reset"));
     }
 }
