@@ -263,7 +263,7 @@ impl CollisionMonitor {
     /// again.
     pub(crate) fn frozen_sensor(&self) -> Option<(String, bool)> {
         let most = if self.settings.noiseless { 0 } else { self.settings.identical_frames };
-        // What only repeats itself is free again with the next reading.
+        // A sensor that only repeats itself is free again with the next reading.
         if self.depth.is_frozen(most) {
             return Some(("the depth image".to_owned(), self.depth.is_frozen(0)));
         }

@@ -582,6 +582,6 @@ mod tests {
         });
         assert_eq!(few, f64::INFINITY);
         assert!(enough < 0.5, "{enough}");
-        assert_eq!(both, together);
+        assert_eq!(both, together, "both together");
     }
 }
