@@ -212,7 +212,7 @@ fn cells(at: usize, real: &[Vec<Form>], simulated: &[Vec<Form>], headline: &Head
     let errors = Cell { deviation: None, ..over_draws(&errors, 3) };
     let figures = simulated.iter().map(|forms| &forms[at].headline);
     let figure = if headline.is_share {
-        share(figures, headline.digits)
+        share_of_draws(figures, headline.digits)
     } else {
         let figures: Vec<Vec<f64>> = figures.cloned().collect();
         let figure = Cell { deviation: None, ..over_draws(&figures, headline.digits) };
@@ -230,7 +230,7 @@ fn cells(at: usize, real: &[Vec<Form>], simulated: &[Vec<Form>], headline: &Head
 
 /// Returns the share of draws with 100, and its Wilson interval, as in the other tables of successes:
 /// a mean of draws that all succeed has none.
-fn share<'a>(draws: impl Iterator<Item = &'a Vec<f64>>, digits: usize) -> Cell {
+fn share_of_draws<'a>(draws: impl Iterator<Item = &'a Vec<f64>>, digits: usize) -> Cell {
     let values: Vec<f64> = draws.flatten().copied().collect();
     let successes = values.iter().filter(|value| **value > 0.0).count();
     Cell::share(successes as u64, values.len() as u64, digits)

@@ -158,15 +158,15 @@ mod tests {
     #[test]
     fn a_network_that_cannot_be_made_is_an_error() {
         /// Returns the error of a network that this cannot load.
-        fn refusal(load: fn() -> Result<Sleeper, String>) -> String {
+        fn refusal_of(load: fn() -> Result<Sleeper, String>) -> String {
             let started = Worker::start(load, |_| Ok(()), Duration::from_secs(1));
             started.err().expect("it cannot be made")
         }
 
-        assert_eq!(refusal(|| Err("no, never".into())), "no, never");
-        let failed = refusal(|| panic!("while loading"));
+        assert_eq!(refusal_of(|| Err("no, never".into())), "no, never");
+        let failed = refusal_of(|| panic!("while loading"));
         assert!(failed.contains("the runtime failed"), "{failed}");
-        let slow = refusal(|| {
+        let slow = refusal_of(|| {
             thread::sleep(Duration::from_secs(3));
             Ok(Sleeper)
         });

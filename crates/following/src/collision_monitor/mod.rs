@@ -282,7 +282,7 @@ impl CollisionMonitor {
     /// Returns the nearest place inside the polygon that this reason comes from, with its distance from
     /// the robot, m.
     pub(crate) fn place_in_zone(&self, reason: Reason) -> Option<(Point2<f64>, f64)> {
-        let inside = self.zones.places(reason, self.hazards.all());
+        let inside = self.zones.places_inside(reason, self.hazards.all());
         let distances = inside.into_iter().map(|at| (at, self.footprint.distance_m(&at)));
         distances.min_by(|a, b| a.1.total_cmp(&b.1))
     }

@@ -256,12 +256,12 @@ impl<'a> Sweep<'a> {
             most,
             points: hazard.points,
             is_person: hazard.kind != HazardKind::Still,
-            place: self.place(hazard),
+            place: self.limiting_place(hazard),
         })
     }
 
     /// Returns the place of the hazard, the last that was measured, for the words of the command.
-    fn place(&self, hazard: &Hazard) -> LimitingPlace {
+    fn limiting_place(&self, hazard: &Hazard) -> LimitingPlace {
         let Braking { reaction_s, rise_s, .. } = self.braking;
         let delay_s = reaction_s + rise_s;
         let way_m = match self.path {
