@@ -247,13 +247,10 @@ mod tests {
         let findings = Findings { tables: vec![table], pictures: vec![picture] };
         let found = ExperimentFindings { experiment: "one", simulated: Vec::new(), findings };
         write(folder.path(), &[found]).unwrap();
-        for (name, part) in [
-            ("tables.md", "**A table**"),
-            ("tables.json", "\"experiment\": \"one\""),
-            ("plot.svg", "<svg/>"),
-        ] {
-            let text = std::fs::read_to_string(folder.path().join(name)).unwrap();
-            assert!(text.contains(part), "{name}: {text}");
-        }
+        let [page, json, plot] = ["tables.md", "tables.json", "plot.svg"]
+            .map(|name| std::fs::read_to_string(folder.path().join(name)).unwrap());
+        assert!(page.contains("**A table**"), "{page}");
+        assert!(json.contains("\"experiment\": \"one\""), "{json}");
+        assert_eq!(plot, "<svg/>");
     }
 }

@@ -212,7 +212,7 @@ fn cells(at: usize, real: &[Vec<Form>], simulated: &[Vec<Form>], headline: &Head
     let errors = Cell { deviation: None, ..over_draws(&errors, 3) };
     let figures = simulated.iter().map(|forms| &forms[at].headline);
     let figure = if headline.is_share {
-        share(figures, headline.digits)
+        share_of_draws(figures, headline.digits)
     } else {
         let figures: Vec<Vec<f64>> = figures.cloned().collect();
         let figure = Cell { deviation: None, ..over_draws(&figures, headline.digits) };
@@ -230,7 +230,7 @@ fn cells(at: usize, real: &[Vec<Form>], simulated: &[Vec<Form>], headline: &Head
 
 /// Returns the share of draws with 100, and its Wilson interval, as in the other tables of successes:
 /// a mean of draws that all succeed has none.
-fn share<'a>(draws: impl Iterator<Item = &'a Vec<f64>>, digits: usize) -> Cell {
+fn share_of_draws<'a>(draws: impl Iterator<Item = &'a Vec<f64>>, digits: usize) -> Cell {
     let values: Vec<f64> = draws.flatten().copied().collect();
     let successes = values.iter().filter(|value| **value > 0.0).count();
     Cell::share(successes as u64, values.len() as u64, digits)
@@ -298,10 +298,16 @@ mod tests {
         assert_eq!(other["filter"]["config"]["condensation"].as_bool(), Some(false));
         assert_eq!(other["detectors"][0]["config"]["whole_image"].as_bool(), Some(true));
         assert_ne!(printed["filter"], other["filter"], "the printed form stays");
-        let draw = draw([(1, 0, &[0.0]), (1, 0, &[100.0]), (1, 0, &[100.0]), (1, 0, &[0.0])]);
-        let table = OF_P3.table(&[], &[draw]);
+        // Of four draws the forms succeed in none, three, all and one.
+        let draws = [
+            draw([(1, 0, &[0.0]), (1, 0, &[0.0]), (1, 0, &[100.0]), (1, 0, &[100.0])]),
+            draw([(1, 0, &[0.0]), (1, 0, &[100.0]), (1, 0, &[100.0]), (1, 0, &[0.0])]),
+            draw([(1, 0, &[0.0]), (1, 0, &[100.0]), (1, 0, &[100.0]), (1, 0, &[0.0])]),
+            draw([(1, 0, &[0.0]), (1, 0, &[100.0]), (1, 0, &[100.0]), (1, 0, &[0.0])]),
+        ];
+        let table = OF_P3.table(&[], &draws);
         let headlines: Vec<_> = table.rows.iter().map(|row| row.cells[5].value.unwrap()).collect();
-        assert_eq!(headlines, [97.1, 0.0, 0.0, 100.0, 100.0]);
+        assert_eq!(headlines, [97.1, 0.0, 25.0, 75.0, 100.0]);
         assert!(table.rows[2].name.starts_with("as printed, read otherwise: one window"));
         assert_eq!(
             OF_P4.with_otherwise((OF_P4.contenders)(&lab, &OF_P4.configs).unwrap()).unwrap().len(),
@@ -332,14 +338,13 @@ mod tests {
             draw([(3, 1, &[3.0]), (4, 4, &[2.0]), (4, 0, &[0.5])]),
         ];
         let table = OF_P4.table(&[], &draws);
-        for (at, values) in [
-            // No log was read.
-            (0, [None; 4]),
-            (3, [None, Some(0.5), Some(0.5), Some(1.0)]),
-            (5, [Some(0.125), Some(2.0), Some(2.0), Some(0.5)]),
+        for (at, values, why) in [
+            (0, [None; 4], "no log was read"),
+            (3, [None, Some(0.5), Some(0.5), Some(1.0)], "MOTA of all draws"),
+            (5, [Some(0.125), Some(2.0), Some(2.0), Some(0.5)], "means over draws"),
         ] {
             let column: Vec<_> = table.rows.iter().map(|row| row.cells[at].value).collect();
-            assert_eq!(column, values);
+            assert_eq!(column, values, "{why}");
         }
         assert!(table.rows[0].published && table.notes[0].contains("no log was read"));
         let logs = [draw([(1, 0, &[]), (1, 0, &[]), (1, 0, &[])])];

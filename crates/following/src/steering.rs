@@ -1,4 +1,3 @@
-use std::cell::RefCell;
 use std::sync::Arc;
 
 use tagalong_core::{
@@ -199,14 +198,14 @@ impl Steering {
             pause_s: self.last.map_or(0.0, |last| frame.stamp.seconds_since(last)),
         };
         self.last = Some(frame.stamp);
-        // What is allowed is noted, to name the cause of the command.
-        let asked = RefCell::new(Vec::new());
+        // The allowances are noted, to name the cause of the command.
+        let mut asked = Vec::new();
         let command = self.limiter.limit(&wish, |path, speed, braking| {
             let allowed = self.monitor.allowance(path, speed, braking);
-            asked.borrow_mut().push(allowed);
+            asked.push(allowed);
             allowed
         });
-        let cause = Cause::of(command.reason, &asked.into_inner(), &self.monitor, tracks);
+        let cause = Cause::of(command.reason, &asked, &self.monitor, tracks);
         // The search learns only now that its wish was blocked; it reacts in the next frame.
         let is_blocked =
             matches!(command.reason, Reason::Blocked | Reason::TooClose | Reason::Unknown);

@@ -161,7 +161,7 @@ impl Preparation {
         let [per_pixel, per_channel] = if input.channels_last { [3, 1] } else { [1, area] };
         let mut values = vec![0.0; 3 * area];
         for channel in 0..3 {
-            let padded = self.scaled(channel, self.padding);
+            let padded = self.scaled_value(channel, self.padding);
             for pixel in 0..area {
                 values[pixel * per_pixel + channel * per_channel] = padded;
             }
@@ -178,7 +178,7 @@ impl Preparation {
                     let above = across.mix_pixels(upper, colour);
                     let below = across.mix_pixels(lower, colour);
                     let value = above + (below - above) * down.weight;
-                    values[pixel + channel * per_channel] = self.scaled(channel, value);
+                    values[pixel + channel * per_channel] = self.scaled_value(channel, value);
                 }
             }
         }
@@ -187,7 +187,7 @@ impl Preparation {
 
     /// Scales a value of a channel as the network was trained with.
     #[inline]
-    fn scaled(&self, channel: usize, value: f32) -> f32 {
+    fn scaled_value(&self, channel: usize, value: f32) -> f32 {
         (value - self.mean[channel]) / self.deviation[channel]
     }
 }

@@ -157,22 +157,19 @@ mod tests {
 
     #[test]
     fn a_network_that_cannot_be_made_is_an_error() {
-        type Load = fn() -> Result<Sleeper, String>;
-        let cases: [(Load, &str); 3] = [
-            (|| Err("no, never".into()), "no, never"),
-            (|| panic!("while loading"), "the runtime failed"),
-            (
-                || {
-                    thread::sleep(Duration::from_secs(3));
-                    Ok(Sleeper)
-                },
-                "within 1 s",
-            ),
-        ];
-        for (load, told) in cases {
-            let refusal = Worker::start(load, |_| Ok(()), Duration::from_secs(1)).err();
-            let refusal = refusal.expect("it cannot be made");
-            assert!(refusal.contains(told), "{refusal}");
+        /// Returns the error of a network that this cannot load.
+        fn refusal_of(load: fn() -> Result<Sleeper, String>) -> String {
+            let started = Worker::start(load, |_| Ok(()), Duration::from_secs(1));
+            started.err().expect("it cannot be made")
         }
+
+        assert_eq!(refusal_of(|| Err("no, never".into())), "no, never");
+        let failed = refusal_of(|| panic!("while loading"));
+        assert!(failed.contains("the runtime failed"), "{failed}");
+        let slow = refusal_of(|| {
+            thread::sleep(Duration::from_secs(3));
+            Ok(Sleeper)
+        });
+        assert!(slow.contains("within 1 s"), "{slow}");
     }
 }

@@ -191,13 +191,15 @@ fn choices_that_do_not_fit_are_refused() {
     let whole = fs::read(path("yolox.onnx")).unwrap();
     let usual = Choices::default();
     for (choices, told) in [
-        (Choices { family: Some(Family::NanoDet), ..usual.clone() }, "not of the family nanodet"),
-        (Choices { family: Some(Family::NanoDet), ..usual.clone() }, "[1, 84, 7]"),
-        (Choices { size: Some([320, 320]), ..usual.clone() }, "fixed size: remove `size`"),
-        (Choices { classes: vec![0, 2], ..usual }, "2 classes from 0, and no 2"),
+        (
+            Choices { family: Some(Family::NanoDet), ..usual.clone() },
+            &["not of the family nanodet", "[1, 84, 7]"][..],
+        ),
+        (Choices { size: Some([320, 320]), ..usual.clone() }, &["fixed size: remove `size`"]),
+        (Choices { classes: vec![0, 2], ..usual }, &["2 classes from 0, and no 2"]),
     ] {
         let why = refusal(&whole, &choices, &Limits::default());
-        assert!(why.contains(told), "{why}");
+        assert!(told.iter().all(|told| why.contains(told)), "{why}");
     }
 }
 
@@ -216,18 +218,17 @@ fn with_names(names: &str) -> Vec<u8> {
 fn people_are_the_class_that_the_file_calls_so() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("named.onnx");
-    for (names, classes, people) in [
-        ("{0: 'Person', 1: 'helmet'}", vec![], 1),
-        ("{0: 'helmet', 1: 'person'}", vec![], 0),
-        // The setting is obeyed.
-        ("{0: 'helmet', 1: 'person'}", vec![0], 1),
-        ("{0: 'helmet', 1: 'vest'}", vec![0], 1),
+    for (names, classes, people, why) in [
+        ("{0: 'Person', 1: 'helmet'}", vec![], 1, "the blob is a person"),
+        ("{0: 'helmet', 1: 'person'}", vec![], 0, "the blob is a helmet"),
+        ("{0: 'helmet', 1: 'person'}", vec![0], 1, "the setting is obeyed"),
+        ("{0: 'helmet', 1: 'vest'}", vec![0], 1, "no class is called a person"),
     ] {
         fs::write(&file, with_names(names)).unwrap();
         let choices = Choices { classes, ..Choices::default() };
         let mut network = PersonNetwork::load(&file, &choices, &Limits::default()).unwrap();
         let found = network.find(&scene(1), &Family::Yolox.preparation(), 0.5, 0.5);
-        assert_eq!(found.unwrap().unwrap().len(), people, "{names} {:?}", choices.classes);
+        assert_eq!(found.unwrap().unwrap().len(), people, "{why}");
     }
     let why =
         refusal(&with_names("{0: 'helmet', 1: 'vest'}"), &Choices::default(), &Limits::default());

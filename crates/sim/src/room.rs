@@ -233,7 +233,7 @@ pub fn distance(way: &[Point2<f64>], place: &Point2<f64>) -> f64 {
 /// Returns the obstacles that people walk around.
 pub fn obstacles(piece: &Furniture) -> Vec<Obstacle> {
     let turn = Rotation2::new(piece.heading_deg.to_radians());
-    // How far each is aside, and its radius.
+    // Offset aside and radius of each disc, m.
     let discs: &[(f64, f64)] = match piece.kind {
         FurnitureKind::Desk => &[(0.0, 0.75)],
         FurnitureKind::Shelf => &[(0.0, 0.45)],

@@ -63,11 +63,6 @@ fn parse_scene(name: &str, text: &str, variant: &Variant) -> Scene {
     scene.map_err(|e| e.render(name, text)).unwrap_or_else(|told| panic!("{told}"))
 }
 
-fn parse(name: &str, text: &str, variant: &Variant) -> Scene {
-    let scene = Scene::parse_with(text, variant);
-    scene.map_err(|e| e.render(name, text)).unwrap_or_else(|told| panic!("{told}"))
-}
-
 #[test]
 fn every_ride_can_have_a_path_of_its_own() {
     for (name, text) in suites().into_iter().filter(|(name, _)| name.starts_with("follow-")) {
@@ -77,9 +72,9 @@ fn every_ride_can_have_a_path_of_its_own() {
             let plain = Variant::of_split(Split::Test, number);
             let varied =
                 plain.clone().with("variation.path_jitter_m", 0.3).with("variation.mirror", true);
-            let scene = parse(&name, &text, &varied);
+            let scene = parse_scene(&name, &text, &varied);
             let path = scene.people[0].path.clone();
-            changed |= path != parse(&name, &text, &plain).people[0].path;
+            changed |= path != parse_scene(&name, &text, &plain).people[0].path;
             assert!(!paths.contains(&path), "{name}: two seeds have the same path");
             paths.push(path);
             assert!(!first_shot(scene).truth.is_empty(), "{name}: the person is there");

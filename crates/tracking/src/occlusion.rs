@@ -297,11 +297,10 @@ mod tests {
         let far = Point3::new(3.5, 0.0, 1.6);
         let camera = camera();
         let region = camera.upper_body(&far);
-        // The last one tells its own range.
-        for (sigmas_m, seen) in [
-            (&[3.0_f64][..], Visibility::Visible),
-            (&[3.0, 0.1], Visibility::Hidden),
-            (&[0.1, 3.0], Visibility::Hidden),
+        for (sigmas_m, seen, why) in [
+            (&[3.0_f64][..], Visibility::Visible, "the range may be another"),
+            (&[3.0, 0.1], Visibility::Hidden, "the second tells the range"),
+            (&[0.1, 3.0], Visibility::Hidden, "its own range is told"),
         ] {
             let covers = sigmas_m.iter().map(|sigma_m| {
                 let covariance = Matrix3::identity() * (sigma_m * sigma_m);
@@ -309,7 +308,8 @@ mod tests {
             });
             let cover = covers.reduce(Occluder::or).unwrap();
             let settings = OcclusionSettings::default();
-            assert_eq!(visibility(&region, &far, &[cover], &camera, &settings), seen);
+            let found = visibility(&region, &far, &[cover], &camera, &settings);
+            assert_eq!(found, seen, "{why}");
         }
     }
 
@@ -451,7 +451,8 @@ mod tests {
             (50.0, 0.0, Visibility::Outside),
         ] {
             let region = Rect::new(300.0, 100.0, width, height);
-            assert_eq!(visibility(&region, &head, &[], &camera, &settings), seen);
+            let found = visibility(&region, &head, &[], &camera, &settings);
+            assert_eq!(found, seen, "{width} x {height}");
         }
     }
 

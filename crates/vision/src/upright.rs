@@ -247,18 +247,17 @@ mod tests {
         }
 
         let depth = DepthImage::from_fn(320, 320, |x, _| wall(x));
-        for (x, row, column, behind_m) in [
-            (3.0, 40, 4, Some(0.5)),
-            (3.0, 40, 30, None),
-            // Feet are below the image.
-            (1.0, 78, 4, None),
+        for (x, row, column, behind_m, why) in [
+            (3.0, 40, 4, Some(0.5), "the wall"),
+            (3.0, 40, 30, None, "nothing was measured"),
+            (1.0, 78, 4, None, "feet are below the image"),
         ] {
             let plane = Upright::new(&camera(), &Point3::new(x, 0.0, 1.6)).unwrap();
             let half = plane.behind_m(&depth, 2).nth(row / 2 * 18 + column / 2);
             let cell = plane.behind_m(&depth, 1).nth(row * 36 + column);
             assert_eq!(half, cell, "every second cell of every second row");
             let found = half.flatten();
-            assert_eq!(found.is_some(), behind_m.is_some(), "{x} {row} {column}");
+            assert_eq!(found.is_some(), behind_m.is_some(), "{why}");
             let off = found.zip(behind_m).map_or(0.0, |(found, wanted): (f32, f32)| found - wanted);
             assert!(off.abs() < 1e-6, "{off}");
         }

@@ -217,7 +217,7 @@ fn with_empty(error: Cell) -> Vec<Cell> {
 }
 
 /// Returns the share of the images in which a step finds the person, with its interval over rooms.
-fn found(walks: &[Walk], step: usize) -> Cell {
+fn found_share(walks: &[Walk], step: usize) -> Cell {
     let mut rooms = Vec::new();
     for walk in walks {
         let near = walk.of_steps[step].iter().filter(|error| **error < FOUND_M).count();
@@ -234,7 +234,7 @@ fn steps(walks: &[Walk]) -> Table {
     for (at, name) in names.enumerate() {
         let draws: Vec<Vec<f64>> = walks.iter().map(|walk| walk.of_steps[at].clone()).collect();
         let cells = vec![
-            found(walks, at),
+            found_share(walks, at),
             over_draws(&draws, 3).within(0.0, f64::INFINITY),
             before.map_or_else(Cell::default, |before| difference(&before, &draws, 3)),
         ];
@@ -279,12 +279,16 @@ mod tests {
 
         // Student's interval of the means of these rooms ends beyond 100 %.
         let rooms = [room(&[0.1; 40], 40), room(&[0.2; 40], 40), room(&[0.1; 30], 40)];
-        let cell = found(&rooms, 0);
+        let cell = found_share(&rooms, 0);
         assert!((cell.value.expect("images") - 100.0 * 110.0 / 120.0).abs() < 1e-9, "{cell:?}");
         let [lower, upper] = cell.interval.expect("three rooms");
         assert!(lower > 0.0 && lower < 80.0 && upper > 95.0 && upper < 100.0, "{cell:?}");
         let far = [room(&[0.1, 0.6], 4), room(&[0.4], 4)];
-        assert_eq!(found(&far, 0).value, Some(25.0), "far off or without an answer is not found");
+        assert_eq!(
+            found_share(&far, 0).value,
+            Some(25.0),
+            "far off or without an answer is not found"
+        );
     }
 
     #[test]

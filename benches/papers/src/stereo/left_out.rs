@@ -114,7 +114,7 @@ pub fn left_out(lab: &Lab) -> Result<Findings, ReproduceError> {
         }
         for (judges, (things, people)) in judges.iter_mut().zip(things.iter_mut().zip(&mut people))
         {
-            let all = rejections(judges[KINDS.len()].as_mut(), frame, sighting.detection)?;
+            let all = count_rejection(judges[KINDS.len()].as_mut(), frame, sighting.detection)?;
             for (at, kind) in KINDS.iter().enumerate() {
                 let of = match sighting.thing {
                     _ if sighting.is_person => &mut *people,
@@ -122,7 +122,7 @@ pub fn left_out(lab: &Lab) -> Result<Findings, ReproduceError> {
                     _ => continue,
                 };
                 of.with = [of.with[0] + 1, of.with[1] + all];
-                let rejected = rejections(judges[at].as_mut(), frame, sighting.detection)?;
+                let rejected = count_rejection(judges[at].as_mut(), frame, sighting.detection)?;
                 of.without = [of.without[0] + 1, of.without[1] + rejected];
             }
         }
@@ -132,7 +132,7 @@ pub fn left_out(lab: &Lab) -> Result<Findings, ReproduceError> {
 }
 
 /// Returns one if a verifier rejects a candidate, and zero if not.
-fn rejections(
+fn count_rejection(
     judge: &mut dyn Verifier,
     frame: &Frame,
     candidate: &Detection,

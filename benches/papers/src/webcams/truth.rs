@@ -107,17 +107,16 @@ mod tests {
     #[test]
     fn between_two_places_somebody_is_on_the_way() {
         let fixes = [fix(1000, 2.0), fix(1500, 3.0), fix(4500, 6.0)];
-        for (ms, place) in [
-            (999, None),
-            (1000, Some((2.0, false))),
-            (1250, Some((2.5, false))),
-            // Nobody saw them for three seconds.
-            (2500, Some((4.0, true))),
-            (4500, Some((6.0, false))),
-            (4501, None),
+        for (ms, place, why) in [
+            (999, None, "before the first place"),
+            (1000, Some((2.0, false)), "at the first place"),
+            (1250, Some((2.5, false)), "on the way"),
+            (2500, Some((4.0, true)), "nobody saw them for three seconds"),
+            (4500, Some((6.0, false)), "at the last place"),
+            (4501, None, "after the last place"),
         ] {
             let found = at(Stamp::from_nanos(1_000_000 * ms), &fixes);
-            assert_eq!(found.map(|(place, is_guess)| (place.x, is_guess)), place, "{ms}");
+            assert_eq!(found.map(|(place, is_guess)| (place.x, is_guess)), place, "{why}");
         }
     }
 

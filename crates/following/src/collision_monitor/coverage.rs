@@ -269,16 +269,14 @@ mod tests {
     #[test]
     fn rays_from_which_nothing_came_back_are_free_where_a_camera_sees() {
         let settings = CollisionMonitorSettings::default();
-        for (instead, look, part) in [
-            // A hall larger than the range.
-            (f64::INFINITY, Look::Seen, 1.0),
-            (f64::INFINITY, Look::Unknown, 0.0),
-            // A scanner that says nothing.
-            (f64::NAN, Look::Seen, 0.0),
+        for (instead, look, part, why) in [
+            (f64::INFINITY, Look::Seen, 1.0, "a hall larger than the range"),
+            (f64::INFINITY, Look::Unknown, 0.0, "no camera sees there"),
+            (f64::NAN, Look::Seen, 0.0, "a scanner that says nothing"),
         ] {
             let scanner = Coverage::of_scan(&settings, &scan(30, instead), 0.3);
             let found = allowed_part(&[camera(look), scanner], &footprint(), AHEAD, 1.3);
-            assert_eq!(found, part, "{instead}");
+            assert_eq!(found, part, "{why}");
         }
     }
 }

@@ -122,10 +122,13 @@ mod tests {
         for (x, y) in [(0.0, 0.0), (0.29, -0.19)] {
             assert_eq!(square.distance_m(&Point2::new(x, y)), 0.0);
         }
-        // The last is 3-4-5 from the corner.
-        for (x, y, wanted_m) in [(0.8, 0.1, 0.5), (0.0, -0.5, 0.3), (0.6, 0.6, 0.5)] {
+        for (x, y, wanted_m, why) in [
+            (0.8, 0.1, 0.5, "ahead"),
+            (0.0, -0.5, 0.3, "beside"),
+            (0.6, 0.6, 0.5, "3-4-5 from the corner"),
+        ] {
             let far_m = square.distance_m(&Point2::new(x, y));
-            assert!((far_m - wanted_m).abs() < 1e-12, "{x} {y}: {far_m}");
+            assert!((far_m - wanted_m).abs() < 1e-12, "{why}: {far_m}");
         }
         assert!((square.radius_m() - 0.13_f64.sqrt()).abs() < 1e-12);
         assert_eq!(square.front_m(), 0.3);

@@ -50,12 +50,18 @@ mod tests {
     #[test]
     fn the_floor_grows_rougher_with_the_distance_and_hanging_lamps_are_passed_below() {
         let settings = CollisionMonitorSettings::default();
-        // 8 cm, and 3 cm a metre.
-        for (x, z) in [(0.0, 0.09), (2.0, 0.15), (-2.0, 0.15), (1.0, 1.49)] {
-            assert!(is_thing(&settings, &Point3::new(x, 0.0, z)), "{x} {z}");
-        }
-        for (x, z) in [(0.0, 0.07), (2.0, 0.13), (1.0, 1.51), (f64::NAN, 0.5)] {
-            assert!(!is_thing(&settings, &Point3::new(x, 0.0, z)), "{x} {z}");
+        for (x, z, expected, why) in [
+            (0.0, 0.07, false, "8 cm"),
+            (0.0, 0.09, true, "8 cm"),
+            (2.0, 0.13, false, "and 3 cm a metre"),
+            (2.0, 0.15, true, "and 3 cm a metre"),
+            (-2.0, 0.15, true, "and 3 cm a metre"),
+            (1.0, 1.49, true, "a lamp that hangs too low"),
+            (1.0, 1.51, false, "a lamp that is passed below"),
+            (f64::NAN, 0.5, false, "no place"),
+        ] {
+            let point = Point3::new(x, 0.0, z);
+            assert_eq!(is_thing(&settings, &point), expected, "{x} {z}: {why}");
         }
     }
 }

@@ -253,7 +253,7 @@ impl CollisionMonitor {
         if !self.has_eyes() || self.is_blind() {
             return Some(Reason::Blind);
         }
-        if self.is_frozen() {
+        if self.frozen_sensor().is_some() {
             return Some(Reason::Frozen);
         }
         self.zones.stop_reason()
@@ -262,8 +262,8 @@ impl CollisionMonitor {
     /// Returns the first sensor that is frozen, by name, and true if that lasts until the robot is armed
     /// again.
     pub(crate) fn frozen_sensor(&self) -> Option<(String, bool)> {
-        let most = self.identical_frames();
-        // What only repeats itself is free again with the next reading.
+        let most = if self.settings.noiseless { 0 } else { self.settings.identical_frames };
+        // A sensor that only repeats itself is free again with the next reading.
         if self.depth.is_frozen(most) {
             return Some(("the depth image".to_owned(), self.depth.is_frozen(0)));
         }
@@ -282,7 +282,7 @@ impl CollisionMonitor {
     /// Returns the nearest place inside the polygon that this reason comes from, with its distance from
     /// the robot, m.
     pub(crate) fn place_in_zone(&self, reason: Reason) -> Option<(Point2<f64>, f64)> {
-        let inside = self.zones.places(reason, self.hazards.all());
+        let inside = self.zones.places_inside(reason, self.hazards.all());
         let distances = inside.into_iter().map(|at| (at, self.footprint.distance_m(&at)));
         distances.min_by(|a, b| a.1.total_cmp(&b.1))
     }
@@ -314,19 +314,6 @@ impl CollisionMonitor {
     fn is_blind(&self) -> bool {
         self.depth.is_blind(&self.settings)
             || self.sources.iter().any(|source| source.is_blind(&self.settings))
-    }
-
-    /// Returns the number of equal readings in a row from which on a sensor is frozen; 0 for none.
-    fn identical_frames(&self) -> u32 {
-        if self.settings.noiseless { 0 } else { self.settings.identical_frames }
-    }
-
-    fn is_frozen(&self) -> bool {
-        let most = self.identical_frames();
-        self.depth.is_frozen(most)
-            || self.laser.is_frozen(most)
-            || self.further_lasers.iter().any(|(laser, _)| laser.is_frozen(most))
-            || self.sources.iter().any(|source| source.is_frozen(most))
     }
 
     /// Returns the largest speeds, up to `speed`, on a path.

@@ -247,21 +247,21 @@ impl<'a> Sweep<'a> {
         let delays = [self.braking.reaction_s, self.braking.reaction_s + self.braking.rise_s];
         let [most, gentle] = delays.map(|delay_s| match hazard.kind {
             HazardKind::Still => self.speed_before(delay_s),
-            HazardKind::Moves(closing) => self.speed_beside(delay_s, |time_s| {
-                self.comes_m(closing, time_s) + self.settings.protective_m
-            }),
-            HazardKind::Followed(closing) => self.speed_beside(delay_s, |time_s| {
-                closing.max(0.0) * time_s + self.settings.followed_stop_m
-            }),
+            HazardKind::Moves(_) | HazardKind::Followed(_) => {
+                self.speed_beside(delay_s, |time_s| self.margin_within(hazard, time_s))
+            }
         });
-        let is_person = hazard.kind != HazardKind::Still;
-        let points = hazard.points;
-        let place = self.place(hazard);
-        (gentle < self.speed).then_some(Limit { gentle, most, points, is_person, place })
+        (gentle < self.speed).then(|| Limit {
+            gentle,
+            most,
+            points: hazard.points,
+            is_person: hazard.kind != HazardKind::Still,
+            place: self.limiting_place(hazard),
+        })
     }
 
     /// Returns the place of the hazard, the last that was measured, for the words of the command.
-    fn place(&self, hazard: &Hazard) -> LimitingPlace {
+    fn limiting_place(&self, hazard: &Hazard) -> LimitingPlace {
         let Braking { reaction_s, rise_s, .. } = self.braking;
         let delay_s = reaction_s + rise_s;
         let way_m = match self.path {
@@ -582,6 +582,6 @@ mod tests {
         });
         assert_eq!(few, f64::INFINITY);
         assert!(enough < 0.5, "{enough}");
-        assert_eq!(both, together);
+        assert_eq!(both, together, "both together");
     }
 }

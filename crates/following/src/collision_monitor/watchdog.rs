@@ -383,6 +383,7 @@ mod tests {
     fn frozen_ranges_of_a_laser_are_the_same_however_the_robot_moves() {
         for (driven_m, turned_rad) in [(0.0, 0.0), (0.1, 0.0), (0.05, 0.2)] {
             let ranges = measured_ranges(&laser_scan(driven_m, turned_rad));
+            assert_eq!(ranges.len(), RANGES.len());
             for (measured_m, range_m) in ranges.iter().zip(RANGES) {
                 assert!((f64::from(*measured_m) - range_m).abs() < 1e-6, "{ranges:?}");
             }

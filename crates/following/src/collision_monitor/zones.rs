@@ -51,7 +51,7 @@ impl Zones {
 
     /// Returns the places inside the polygon that a reason comes from, those of its kind of hazard;
     /// none if the reason does not come from a polygon.
-    pub(super) fn places(&self, reason: Reason, hazards: &[Hazard]) -> Vec<Point2<f64>> {
+    pub(super) fn places_inside(&self, reason: Reason, hazards: &[Hazard]) -> Vec<Point2<f64>> {
         let zone = if self.stop_reason() == Some(reason) {
             &self.stop
         } else if self.slowdown_reason() == Some(reason) {
@@ -120,8 +120,8 @@ mod tests {
         zones.update(&[hazard(0.5, 6, HazardKind::Moves(0.3))]);
         assert_eq!(zones.stop_reason(), Some(Reason::TooClose));
         let both = [hazard(0.5, 6, HazardKind::Moves(0.3)), hazard(0.4, 1, HazardKind::Still)];
-        assert_eq!(zones.places(Reason::TooClose, &both), [both[0].at]);
-        assert_eq!(zones.places(Reason::Blocked, &both), []);
+        assert_eq!(zones.places_inside(Reason::TooClose, &both), [both[0].at]);
+        assert_eq!(zones.places_inside(Reason::Blocked, &both), []);
         let mut none = Zones::new(&CollisionMonitorSettings::default());
         none.update(&[hazard(0.3, 99, HazardKind::Still)]);
         assert_eq!((none.stop_reason(), none.slowdown_reason()), (None, None));

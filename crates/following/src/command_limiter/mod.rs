@@ -193,7 +193,7 @@ impl CommandLimiter {
     pub(crate) fn limit(
         &mut self,
         wish: &Wish,
-        look: impl Fn(Path, f64, &Braking) -> Allowance,
+        look: impl FnMut(Path, f64, &Braking) -> Allowance,
     ) -> Command {
         let (motion, reason) = match self.must_stop(wish) {
             Some(reason) => (Motion::default(), reason),
@@ -331,7 +331,7 @@ impl CommandLimiter {
     fn limited(
         &self,
         wish: &Wish,
-        look: impl Fn(Path, f64, &Braking) -> Allowance,
+        mut look: impl FnMut(Path, f64, &Braking) -> Allowance,
     ) -> (Motion, Reason) {
         let (before, dt) = self.before(wish.stamp);
         let (wanted, why, is_capped) = self.wanted(wish);
@@ -368,7 +368,7 @@ impl CommandLimiter {
         next: Motion,
         reason: Reason,
         dt: f64,
-        look: impl Fn(Path, f64, &Braking) -> Allowance,
+        mut look: impl FnMut(Path, f64, &Braking) -> Allowance,
     ) -> (Motion, Reason) {
         let speed = next.turn.speed.abs();
         if speed <= STILL_RPS {

@@ -515,21 +515,19 @@ fn a_base_that_responds_late_is_slower_and_one_that_is_much_too_late_is_a_fault(
 
 #[test]
 fn of_several_limits_the_lowest_holds_and_is_named() {
-    for (aim, pause_s, at_m, reason, percent) in [
-        (Aim::Perhaps, 0.1, 2.0, Reason::Unsure, 70.0),
-        // Not a quarter.
-        (Aim::Perhaps, 0.3, 2.0, Reason::Slow, 70.0),
-        (Aim::Perhaps, 0.1, 0.45, Reason::Obstacle, 9.0),
-        (Aim::Person, 0.1, 0.7, Reason::Obstacle, 42.0),
-        // Just in time, and just not stopped.
-        (Aim::Person, 0.25, 2.0, Reason::Follow, 80.0),
-        (Aim::Person, 0.5, 2.0, Reason::Slow, 70.0),
+    for (aim, pause_s, at_m, reason, percent, why) in [
+        (Aim::Perhaps, 0.1, 2.0, Reason::Unsure, 70.0, "half speed"),
+        (Aim::Perhaps, 0.3, 2.0, Reason::Slow, 70.0, "and not a quarter"),
+        (Aim::Perhaps, 0.1, 0.45, Reason::Obstacle, 9.0, "an obstacle before half speed"),
+        (Aim::Person, 0.1, 0.7, Reason::Obstacle, 42.0, "an obstacle"),
+        (Aim::Person, 0.25, 2.0, Reason::Follow, 80.0, "just in time"),
+        (Aim::Person, 0.5, 2.0, Reason::Slow, 70.0, "just not stopped"),
     ] {
         let (mut limiter, _) = at_speed(0.8, 0.8);
         let wish = Wish { aim, pause_s, ..wish(40, 0.8, 0.8) };
         let command = limiter.limit(&wish, something(at_m));
         let found = (command.reason, (command.wheels.left * 100.0).round());
-        assert_eq!(found, (reason, percent), "{wish:?}");
+        assert_eq!(found, (reason, percent), "{why}");
     }
 }
 

@@ -345,11 +345,10 @@ mod tests {
     fn only_a_nearer_person_in_sight_is_taken_instead_of_the_chosen_one() {
         let settings = TargetSettings { reconsider_s: 5.0, ..TargetSettings::default() };
         let chosen = track(1, 2.5, 0.0, 0.0);
-        // Who is not seen is predicted only.
-        for (seen, instead) in [(true, Some(2)), (false, None)] {
+        for (seen, instead, why) in [(true, Some(2), "in sight"), (false, None, "predicted only")] {
             let tracks = [chosen.clone(), track(2, 1.5, 0.0, 0.0).with_seen(seen)];
             let nearer = Chooser::default().reconsider(&settings, &chosen, &tracks, DT_S);
-            assert_eq!(nearer.map(|track| track.id.0), instead);
+            assert_eq!(nearer.map(|track| track.id.0), instead, "{why}");
         }
     }
 }

@@ -45,7 +45,7 @@ impl Simulation {
             world_from_robot: self.robot.pose,
             target_gap_m: target.map(|target| gaps_m[target]),
             others_gap_m: others.map(|(_, gap_m)| *gap_m).fold(f64::INFINITY, f64::min),
-            target_in_sight: target.is_some_and(|target| self.in_sight(&robot, &places)[target]),
+            target_in_sight: target.is_some_and(|who| self.is_in_sight(&robot, &places, who)),
             target_arrived: self.walkers.first().is_some_and(Walker::has_arrived),
         })
     }
@@ -111,16 +111,25 @@ mod tests {
 
         let reach = "laser = { max_range_m = 2.0 }";
         let block = "blocks = [{ at = [6.5, 5.0], size_m = [0.2, 4.0] }]";
-        for (more, places, in_sight) in [
-            // Behind another, and partly behind.
-            ("", vec![at(8.0, 5.0), at(7.0, 5.0)], vec![false, true]),
-            ("", vec![at(8.0, 5.0), at(7.0, 5.4)], vec![true, true]),
-            ("", vec![at(10.2, 5.0), at(10.4, 5.0), at(2.0, 5.0)], vec![true, false, true]),
-            (reach, vec![at(8.0, 5.0), at(7.0, 5.0)], vec![false, true]),
-            (block, vec![at(8.0, 5.0), at(5.0, 8.0)], vec![false, true]),
+        let from = at(5.0, 5.0);
+        for (more, places, in_sight, why) in [
+            ("", vec![at(8.0, 5.0), at(7.0, 5.0)], vec![false, true], "behind another"),
+            ("", vec![at(8.0, 5.0), at(7.0, 5.4)], vec![true, true], "partly behind"),
+            (
+                "",
+                vec![at(10.2, 5.0), at(10.4, 5.0), at(2.0, 5.0)],
+                vec![true, false, true],
+                "beyond the reach",
+            ),
+            (
+                reach,
+                vec![at(8.0, 5.0), at(7.0, 5.0)],
+                vec![false, true],
+                "beyond the range of a scanner",
+            ),
+            (block, vec![at(8.0, 5.0), at(5.0, 8.0)], vec![false, true], "behind a block"),
         ] {
-            let found = simulation(more).in_sight(&at(5.0, 5.0), &places);
-            assert_eq!(found, in_sight, "{more} {places:?}");
+            assert_eq!(simulation(more).in_sight(&from, &places), in_sight, "{why}");
         }
     }
 

@@ -234,15 +234,14 @@ mod tests {
     fn wheels_are_not_wrong_by_any_angle() {
         let pose = Isometry2::new(Vector2::new(0.3, 0.1), 0.8);
         let prior = Prior { pose, sigma: Vector3::new(0.01, 0.01, 0.002) };
-        for (forward, left, turn, is_too_far) in [
-            // Three standard deviations each.
-            (0.03, -0.03, 0.006, false),
-            (0.04, 0.0, 0.0, true),
-            (0.0, -0.04, 0.0, true),
-            (0.0, 0.0, 0.008, true),
+        for (forward, left, turn, is_too_far, why) in [
+            (0.03, -0.03, 0.006, false, "three standard deviations each"),
+            (0.04, 0.0, 0.0, true, "four ahead"),
+            (0.0, -0.04, 0.0, true, "four aside"),
+            (0.0, 0.0, 0.008, true, "four of the turn"),
         ] {
             let off = Isometry2::new(Vector2::new(forward, left), turn);
-            assert_eq!(prior.is_contradicted_by(&(pose * off)), is_too_far, "{off}");
+            assert_eq!(prior.is_contradicted_by(&(pose * off)), is_too_far, "{why}");
         }
     }
 

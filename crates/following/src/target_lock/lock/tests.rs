@@ -146,13 +146,15 @@ fn nobody_is_farther_than_they_can_have_walked() {
     assert!(lock.is_in_reach(&somebody(1, 99.0, 0.0)), "seen nowhere before");
     let (place, velocity) = (Point2::new(1.0, 1.0), Vector2::zeros());
     lock.last = Some(LastSeen { place, velocity, ago_s: 1.0 });
-    // 0.6 m and 2 m/s, and three times 0.2 m.
-    for (off_m, variance, is_in_reach) in
-        [(2.59, 0.0, true), (2.61, 0.0, false), (3.19, 0.02, true), (3.21, 0.02, false)]
-    {
+    for (off_m, variance, is_in_reach, why) in [
+        (2.59, 0.0, true, "0.6 m and 2 m/s"),
+        (2.61, 0.0, false, "0.6 m and 2 m/s"),
+        (3.19, 0.02, true, "three times 0.2 m"),
+        (3.21, 0.02, false, "three times 0.2 m"),
+    ] {
         let mut track = somebody(1, 1.0, 1.0 + off_m);
         track.estimate.covariance = SMatrix::identity() * variance;
-        assert_eq!(lock.is_in_reach(&track), is_in_reach, "{off_m}");
+        assert_eq!(lock.is_in_reach(&track), is_in_reach, "{off_m}: {why}");
     }
 }
 
