@@ -77,7 +77,7 @@ pub(super) fn builtin_names() -> impl Iterator<Item = &'static str> {
 /// name.
 pub(super) fn builtin_text(name: &str) -> Option<String> {
     let text = text_alone(name)?;
-    let whole = Document::read_builtin(text).and_then(Document::flattened);
+    let whole = Document::read_builtin(text).and_then(Document::into_flat_text);
     Some(whole.unwrap_or_else(|_| text.to_owned()))
 }
 

@@ -155,7 +155,7 @@ impl Document {
     ///
     /// # Errors
     /// None for a config that was read.
-    pub(super) fn flattened(self) -> Result<String, ConfigError> {
+    pub(super) fn into_flat_text(self) -> Result<String, ConfigError> {
         if self.bases.is_empty() {
             return Ok(self.text);
         }
@@ -182,7 +182,7 @@ impl Document {
 /// # Errors
 /// As [`Document::read`].
 pub fn flattened(text: &str, folder: &Path) -> Result<String, ConfigError> {
-    Document::read(text, folder)?.flattened()
+    Document::read(text, folder)?.into_flat_text()
 }
 
 /// Parses a text that begins at byte `start` of the given one.

@@ -29,7 +29,7 @@ pub fn named_in(heading: &str) -> Option<&str> {
 
 /// Returns the numbers in the tables of a README that are not the defaults of its plugin. A row names
 /// one setting or several, with as many defaults; words instead of a number are not compared.
-pub fn wrong(readme: &str, of_plugin: &BTreeMap<&str, &str>) -> Vec<String> {
+pub fn wrong_defaults(readme: &str, of_plugin: &BTreeMap<&str, &str>) -> Vec<String> {
     let mut complaints = Vec::new();
     for line in readme.lines() {
         let [keys, told, ..] = &setting_cells(line)[..] else { continue };
@@ -40,7 +40,7 @@ pub fn wrong(readme: &str, of_plugin: &BTreeMap<&str, &str>) -> Vec<String> {
         }
         for (key, told) in keys.into_iter().zip(told) {
             let Some(default) = of_plugin.get(key) else { continue };
-            if let (Some(told_number), Some(number)) = (number(told), number(default))
+            if let (Some(told_number), Some(number)) = (parse_number(told), parse_number(default))
                 && told_number != number
             {
                 complaints
@@ -56,7 +56,7 @@ fn setting_cells(line: &str) -> Vec<&str> {
     if line.starts_with("| `") { cells(line) } else { Vec::new() }
 }
 
-fn number(text: &str) -> Option<f64> {
+fn parse_number(text: &str) -> Option<f64> {
     text.replace(',', "").parse().ok()
 }
 
@@ -92,8 +92,8 @@ mod tests {
             ("| `a` | 3, 4 | not as many |", &[]),
             ("`a` | 3 | no row", &[]),
         ] {
-            assert_eq!(wrong(row, &defaults["p-q"]), expected, "{row}");
+            assert_eq!(wrong_defaults(row, &defaults["p-q"]), expected, "{row}");
         }
-        assert!(wrong("| `a` | 12,000 | thousands |", &defaults["r"]).is_empty());
+        assert!(wrong_defaults("| `a` | 12,000 | thousands |", &defaults["r"]).is_empty());
     }
 }

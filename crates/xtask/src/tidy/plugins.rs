@@ -59,7 +59,7 @@ pub fn check(workspace: &Workspace, metadata: &Metadata) -> Result<Vec<String>> 
     let settings = workspace.read(LIST)?;
     for (name, of_plugin) in defaults::of_page(&settings) {
         if let Some((file, text)) = pages.get(name) {
-            let wrong = defaults::wrong(text, &of_plugin);
+            let wrong = defaults::wrong_defaults(text, &of_plugin);
             complaints.extend(wrong.into_iter().map(|wrong| format!("{file} {wrong}")));
         }
     }
