@@ -91,9 +91,9 @@ pub fn depth(array: &Bound<'_, PyAny>) -> PyResult<DepthImage> {
     DepthImage::from_pixels(width, height, packed).ok_or_else(|| wrong("depth has a wrong size"))
 }
 
-/// A depth in metres; none that is not above zero.
+/// Returns a depth in metres; NaN where it is no reading.
 fn of_metres(value: f32) -> f32 {
-    if value.is_finite() && value > 0.0 { value } else { f32::NAN }
+    if DepthImage::is_reading(value) { value } else { f32::NAN }
 }
 
 fn of_millimetres(value: u16) -> f32 {

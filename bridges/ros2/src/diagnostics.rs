@@ -140,7 +140,7 @@ impl Status {
             name: "tagalong: follow".into(),
             message,
             hardware_id: "tagalong".into(),
-            values: values.map(|(key, value)| KeyValue { key: key.into(), value }).to_vec(),
+            values: values.map(|(key, value)| KeyValue { key: key.into(), value }).into(),
         }
     }
 

@@ -146,28 +146,35 @@ fn enrollment(parameters: &[Parameter]) -> Result<Enrollment, String> {
     let mut person = None;
     let mut patience = Enrollment::of(Choice::Nearest);
     for Parameter { name, value } in parameters {
-        let wrong = format!("`{name}` must be");
         let choice = match name.as_str() {
-            "person" => Some(named(value).ok_or(format!("{wrong} \"nearest\" or \"approach\""))?),
+            "person" => {
+                let choice = named(value);
+                Some(choice.ok_or_else(|| wrong_value(name, "\"nearest\" or \"approach\""))?)
+            }
             "track" => {
                 let number = number(value).and_then(whole);
-                let number = number.ok_or(format!("{wrong} the number of a track"))?;
+                let number = number.ok_or_else(|| wrong_value(name, "the number of a track"))?;
                 Some(Choice::Track(TrackId(number)))
             }
-            "point" => Some(Choice::Point(point(value).ok_or(format!("{wrong} two numbers"))?)),
+            "point" => {
+                let point = point(value).ok_or_else(|| wrong_value(name, "two numbers"))?;
+                Some(Choice::Point(point))
+            }
             "lose_after_s" => {
-                patience.lose_after_s = Some(number(value).ok_or(format!("{wrong} a number"))?);
+                let number = number(value).ok_or_else(|| wrong_value(name, "a number"))?;
+                patience.lose_after_s = Some(number);
                 None
             }
             "give_up_s" => {
-                patience.give_up_s = Some(number(value).ok_or(format!("{wrong} a number"))?);
+                let number = number(value).ok_or_else(|| wrong_value(name, "a number"))?;
+                patience.give_up_s = Some(number);
                 None
             }
             "search" if value.ptype == ParameterType::BOOL => {
                 patience.search = Some(value.boolean_value);
                 None
             }
-            "search" => return Err(format!("{wrong} true or false")),
+            "search" => return Err(wrong_value(name, "true or false")),
             _ => {
                 let known = "person, track, point, lose_after_s, search, give_up_s";
                 return Err(format!("unknown `{name}`; there are {known}"));
@@ -180,6 +187,11 @@ fn enrollment(parameters: &[Parameter]) -> Result<Enrollment, String> {
     }
     let person = person.ok_or("give `person`, `track` or `point`")?;
     Ok(Enrollment { person, ..patience })
+}
+
+/// Returns the refusal of a parameter that has a value of another kind.
+fn wrong_value(name: &str, wanted: &str) -> String {
+    format!("`{name}` must be {wanted}")
 }
 
 fn named(value: &ParameterValue) -> Option<Choice> {

@@ -361,7 +361,7 @@ fn as_text(said: &Said<'_>) -> Result<String, Failure> {
         let gap = if out.is_empty() { "" } else { "\n" };
         let _ = writeln!(out, "{gap}{heading}");
         for name in names {
-            let _ = writeln!(out, "{name:<24} {:>10}", figure(&figures[*name]));
+            let _ = writeln!(out, "{name:<24} {:>10}", shown_figure(&figures[*name]));
         }
     }
     if let Some(rules) = said.rules {
@@ -374,7 +374,7 @@ fn as_text(said: &Said<'_>) -> Result<String, Failure> {
 }
 
 /// Formats a figure: a count as it is, and "-" for one that makes no sense on the input.
-fn figure(value: &Value) -> String {
+fn shown_figure(value: &Value) -> String {
     match (value.as_u64(), value.as_f64()) {
         (Some(count), _) => count.to_string(),
         (None, Some(figure)) => format!("{figure:.4}"),

@@ -401,7 +401,10 @@ fn doubled_ids_of_a_truth_are_dropped_if_asked_for() {
     let failed = home.report("out")["tasks"][0]["outcome"].clone();
     let why = failed["why"].as_str().unwrap_or_default();
     assert!(why.contains("occurs twice") && why.contains("`--drop-doubled-ids`"), "{failed}");
-    ok(home.bench(&[&only[..], &["-o", "dropped", "--drop-doubled-ids"]].concat()));
+    let output = home.bench(&[&only[..], &["-o", "dropped", "--drop-doubled-ids"]].concat());
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    let told = text(&output.stdout);
+    assert!(told.contains("note: short.people.csv: 1 people are left out"), "{told}");
     let notes = home.report("dropped")["notes"].to_string();
     assert!(notes.contains("\"short.people.csv: 1 people are left out"), "{notes}");
     assert_eq!(home.report("dropped")["tasks"][0]["outcome"]["ended"], "done");

@@ -3,7 +3,7 @@
 use std::io::{self, ErrorKind};
 use std::path::Path;
 
-use super::document::flattened_with;
+use super::document::Document;
 
 /// Names and texts of configs.
 macro_rules! configs {
@@ -77,7 +77,7 @@ pub(super) fn builtin_names() -> impl Iterator<Item = &'static str> {
 /// name.
 pub(super) fn builtin_text(name: &str) -> Option<String> {
     let text = text_alone(name)?;
-    let whole = flattened_with(text, Path::new("configs"), &read_base);
+    let whole = Document::read_builtin(text).and_then(Document::into_flat_text);
     Some(whole.unwrap_or_else(|_| text.to_owned()))
 }
 

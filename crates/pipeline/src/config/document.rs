@@ -25,9 +25,6 @@ pub(super) const EXTENDS: &str = "extends";
 /// Ending of the name of a config.
 const ENDING: &str = "toml";
 
-/// Returns the text of the config at a path.
-pub type ReadBase<'a> = dyn Fn(&Path) -> io::Result<String> + 'a;
-
 /// A config, and those that it extends.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Document {
@@ -59,23 +56,32 @@ impl Base {
 impl Document {
     /// Reads a config. The config that it extends is looked for from `folder`.
     ///
-    /// # Errors A text that is no TOML, too long or nested too deep, and a base that cannot be
-    /// read, extends itself, or has such a fault.
+    /// # Errors
+    /// A text that is no TOML, too long or nested too deep, an entry that an inherited list does not
+    /// have, and a base that cannot be read, extends itself, or has such a fault.
     pub fn read(text: &str, folder: &Path) -> Result<Self, ConfigError> {
-        Self::read_with(text, folder, &read_config)
+        Self::read_from(text, folder, false)
     }
 
-    /// Reads a config; `read_base` returns the texts of the configs that are extended.
-    fn read_with(text: &str, folder: &Path, read_base: &ReadBase<'_>) -> Result<Self, ConfigError> {
+    /// Reads a config that is part of the program, and so are those that it extends.
+    ///
+    /// # Errors
+    /// As [`Document::read`].
+    pub(super) fn read_builtin(text: &str) -> Result<Self, ConfigError> {
+        Self::read_from(text, Path::new("configs"), true)
+    }
+
+    fn read_from(text: &str, folder: &Path, mut is_builtin: bool) -> Result<Self, ConfigError> {
         let mut document = Self { text: text.to_owned(), bases: Vec::new() };
         let mut folder = folder.to_owned();
         let mut end = text.len();
         let mut extends = parse(text, 0)?.remove(EXTENDS).map(name_of);
         while let Some((name, span)) = &extends {
-            let base = base_at(&folder, name.as_deref(), end, &document.bases, read_base)
+            let base = base_at(&folder, name.as_deref(), end, &document.bases, is_builtin)
                 .map_err(|message| ConfigError::new(message).or_at(Some(span.clone())));
             let base = base.map_err(|error| document.locate(error))?;
             end = base.padded.len();
+            is_builtin = base.is_builtin;
             base.folder().clone_into(&mut folder);
             document.bases.push(base.clone());
             let table = parse(&base.padded, base.start).map_err(|error| document.locate(error));
@@ -144,6 +150,18 @@ impl Document {
         Ok(toml::Table::deserialize(toml::de::ValueDeserializer::from(whole))?)
     }
 
+    /// Returns the config as one TOML text that extends no other: the text itself if it does so
+    /// already.
+    ///
+    /// # Errors
+    /// None for a config that was read.
+    pub(super) fn into_flat_text(self) -> Result<String, ConfigError> {
+        if self.bases.is_empty() {
+            return Ok(self.text);
+        }
+        toml::to_string(&self.table()?).map_err(|error| ConfigError::new(error.to_string()))
+    }
+
     /// Names the file of a mistake that lies in a base, with the line there.
     pub fn locate(&self, error: ConfigError) -> ConfigError {
         let Some(span) = &error.span else { return error };
@@ -164,27 +182,7 @@ impl Document {
 /// # Errors
 /// As [`Document::read`].
 pub fn flattened(text: &str, folder: &Path) -> Result<String, ConfigError> {
-    flattened_with(text, folder, &read_config)
-}
-
-/// As [`flattened`]; `read_base` returns the texts of the configs that are extended.
-///
-/// # Errors
-/// As [`Document::read`].
-pub fn flattened_with(
-    text: &str,
-    folder: &Path,
-    read_base: &ReadBase<'_>,
-) -> Result<String, ConfigError> {
-    let document = Document::read_with(text, folder, read_base)?;
-    if document.bases.is_empty() {
-        return Ok(text.to_owned());
-    }
-    toml::to_string(&document.table()?).map_err(|error| ConfigError::new(error.to_string()))
-}
-
-fn read_config(path: &Path) -> io::Result<String> {
-    read_text(path, FileLimit::Config)
+    Document::read(text, folder)?.into_flat_text()
 }
 
 /// Parses a text that begins at byte `start` of the given one.
@@ -223,7 +221,7 @@ fn base_at(
     name: Option<&str>,
     start: usize,
     before: &[Base],
-    read_base: &ReadBase<'_>,
+    of_builtin: bool,
 ) -> Result<Base, String> {
     let Some(name) = name else { return Err(format!("`{EXTENDS}` must be the path of a config")) };
     let path = folder.join(name);
@@ -242,11 +240,10 @@ fn base_at(
             "cannot extend {shown}: a config is a file whose name ends in .{ENDING}{remedy}"
         ));
     }
-    let of_builtin = before.last().is_some_and(|base| base.is_builtin);
     let found = if of_builtin {
         builtin::read_base(&path).map(|text| (text, true))
     } else {
-        file_or_builtin(&path, name, read_base)
+        file_or_builtin(&path, name)
     };
     let (text, is_builtin) = found.map_err(|error| {
         let hint =
@@ -259,12 +256,8 @@ fn base_at(
 /// Returns the text of a config, and whether it is built in. A file stands before a built-in config,
 /// which is looked up by its name where there is none: a program that was installed comes without the
 /// folder of its configs.
-fn file_or_builtin(
-    path: &Path,
-    name: &str,
-    read_base: &ReadBase<'_>,
-) -> io::Result<(String, bool)> {
-    let error = match read_base(path) {
+fn file_or_builtin(path: &Path, name: &str) -> io::Result<(String, bool)> {
+    let error = match read_text(path, FileLimit::Config) {
         Ok(text) => return Ok((text, false)),
         Err(error) => error,
     };

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::accuracy::cells;
+
 /// Defaults of the settings of each plugin, by its name.
 pub type Defaults<'a> = BTreeMap<&'a str, BTreeMap<&'a str, &'a str>>;
 
@@ -12,21 +14,25 @@ pub fn of_page(page: &str) -> Defaults<'_> {
     let mut plugin = None;
     for line in page.lines() {
         if line.starts_with('#') {
-            let named = line.strip_prefix("### `").and_then(|rest| rest.split_once("` ("));
-            plugin = named.map(|(name, _)| name);
-        } else if let (Some(plugin), [key, default, ..]) = (plugin, &cells(line)[..]) {
+            plugin = named_in(line);
+        } else if let (Some(plugin), [key, default, ..]) = (plugin, &setting_cells(line)[..]) {
             all.entry(plugin).or_default().insert(key.trim_matches('`'), default.trim_matches('`'));
         }
     }
     all
 }
 
+/// Returns the name of the plugin in a heading "### `plugin` (kind)".
+pub fn named_in(heading: &str) -> Option<&str> {
+    heading.strip_prefix("### `")?.split_once("` (").map(|(name, _)| name)
+}
+
 /// Returns the numbers in the tables of a README that are not the defaults of its plugin. A row names
 /// one setting or several, with as many defaults; words instead of a number are not compared.
-pub fn wrong(readme: &str, of_plugin: &BTreeMap<&str, &str>) -> Vec<String> {
+pub fn wrong_defaults(readme: &str, of_plugin: &BTreeMap<&str, &str>) -> Vec<String> {
     let mut complaints = Vec::new();
     for line in readme.lines() {
-        let [keys, told, ..] = &cells(line)[..] else { continue };
+        let [keys, told, ..] = &setting_cells(line)[..] else { continue };
         let keys: Vec<&str> = keys.split(", ").map(|key| key.trim_matches('`')).collect();
         let told: Vec<&str> = told.split(", ").map(|value| value.trim_matches('`')).collect();
         if keys.len() != told.len() {
@@ -34,7 +40,7 @@ pub fn wrong(readme: &str, of_plugin: &BTreeMap<&str, &str>) -> Vec<String> {
         }
         for (key, told) in keys.into_iter().zip(told) {
             let Some(default) = of_plugin.get(key) else { continue };
-            if let (Some(told_number), Some(number)) = (number(told), number(default))
+            if let (Some(told_number), Some(number)) = (parse_number(told), parse_number(default))
                 && told_number != number
             {
                 complaints
@@ -45,14 +51,12 @@ pub fn wrong(readme: &str, of_plugin: &BTreeMap<&str, &str>) -> Vec<String> {
     complaints
 }
 
-/// Returns the cells of a row of a table; none of another line.
-fn cells(line: &str) -> Vec<&str> {
-    let row = line.strip_prefix("| `").and_then(|_| line.trim().strip_prefix('|'));
-    let row = row.and_then(|row| row.strip_suffix('|'));
-    row.map_or_else(Vec::new, |row| row.split(" | ").map(str::trim).collect())
+/// Returns the cells of a row of settings; none of another line.
+fn setting_cells(line: &str) -> Vec<&str> {
+    if line.starts_with("| `") { cells(line) } else { Vec::new() }
 }
 
-fn number(text: &str) -> Option<f64> {
+fn parse_number(text: &str) -> Option<f64> {
     text.replace(',', "").parse().ok()
 }
 
@@ -88,8 +92,8 @@ mod tests {
             ("| `a` | 3, 4 | not as many |", &[]),
             ("`a` | 3 | no row", &[]),
         ] {
-            assert_eq!(wrong(row, &defaults["p-q"]), expected, "{row}");
+            assert_eq!(wrong_defaults(row, &defaults["p-q"]), expected, "{row}");
         }
-        assert!(wrong("| `a` | 12,000 | thousands |", &defaults["r"]).is_empty());
+        assert!(wrong_defaults("| `a` | 12,000 | thousands |", &defaults["r"]).is_empty());
     }
 }

@@ -21,7 +21,7 @@ use crate::metadata::Metadata;
 use crate::workspace::Workspace;
 
 /// Prints complaints.
-fn tell(complaints: &[String]) {
+fn print_complaints(complaints: &[String]) {
     for complaint in complaints {
         eprintln!("tidy: {complaint}");
     }
@@ -43,11 +43,11 @@ pub fn tidy(workspace: &Workspace) -> Result<()> {
     let documents = markdown::documents(workspace)?;
     complaints.extend(paths::check(workspace, &documents));
     complaints.extend(commands::check(workspace, &metadata, &documents)?);
-    tell(&complaints);
+    print_complaints(&complaints);
     // The programs that print parts of documents are built first, which takes minutes in a new clone.
     eprintln!("tidy: the parts of documents that commands print");
     let stale = crate::docs::stale(workspace)?;
-    tell(&stale);
+    print_complaints(&stale);
     complaints.extend(stale);
     let stale = crate::docs::stale_tables(workspace)?.len();
     if stale > 0 {

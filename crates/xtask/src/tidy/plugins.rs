@@ -59,24 +59,22 @@ pub fn check(workspace: &Workspace, metadata: &Metadata) -> Result<Vec<String>> 
     let settings = workspace.read(LIST)?;
     for (name, of_plugin) in defaults::of_page(&settings) {
         if let Some((file, text)) = pages.get(name) {
-            let wrong = defaults::wrong(text, &of_plugin);
+            let wrong = defaults::wrong_defaults(text, &of_plugin);
             complaints.extend(wrong.into_iter().map(|wrong| format!("{file} {wrong}")));
         }
     }
-    for name in registered(workspace)? {
-        if !used.contains(&name) && !DEFAULTS.contains(&name.as_str()) {
+    for name in headed(&settings).collect::<BTreeSet<_>>() {
+        if !used.contains(name) && !DEFAULTS.contains(&name) {
             complaints.push(format!(
                 "no config in configs/ or benches/papers/configs/ uses the plugin `{name}`"
             ));
         }
-        match pages.get(page_of(&name)) {
+        match pages.get(page_of(name)) {
             Some((file, text)) => {
                 complaints.extend(gaps(text).into_iter().map(|gap| format!("{file} {gap}")));
             }
-            None => complaints.push(format!(
-                "no README.md below plugins/ has the heading `# {}`",
-                page_of(&name)
-            )),
+            None => complaints
+                .push(format!("no README.md below plugins/ has the heading `# {}`", page_of(name))),
         }
     }
     Ok(complaints)
@@ -92,8 +90,7 @@ pub fn registered(workspace: &Workspace) -> Result<BTreeSet<String>> {
 
 /// Returns the names in the headings "### `name` (kind)".
 fn headed(page: &str) -> impl Iterator<Item = &str> {
-    let headings = page.lines().filter_map(|line| line.strip_prefix("### `"));
-    headings.filter_map(|heading| heading.split_once("` (")).map(|(name, _)| name)
+    page.lines().filter_map(defaults::named_in)
 }
 
 /// Returns the plugin on whose page this one is described.

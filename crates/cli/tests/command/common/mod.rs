@@ -34,7 +34,7 @@ pub fn unread(command: &mut Command) -> Output {
 /// The program as it is shipped.
 pub fn tagalong() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tagalong"));
-    // The networks that somebody has installed on this machine choose other pipelines.
+    // Networks that are installed on this machine would choose other pipelines.
     command.env("TAGALONG_HOME", concat!(env!("CARGO_TARGET_TMPDIR"), "/nothing-installed"));
     command
 }

@@ -94,6 +94,7 @@ fn slow_number(nibbles: &mut impl Iterator<Item = u32>) -> Option<u32> {
     }
     None
 }
+
 proptest! {
     /// Rows of any filters, also of unknown ones, by the decoder that reads all kinds of PNG.
     #[test]
