@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use tagalong_core::DepthImage;
+use tagalong_core::{DepthImage, Frame};
 use tagalong_geometry::{Camera, Rect};
 
 use super::Rules;
@@ -24,11 +24,11 @@ const LEAST_SHARE: f64 = 0.2;
 /// Part of a box, about its centre, in which the person is in front.
 const CORE: f64 = 0.5;
 
-/// Depth image of a frame in coarse cells, with its camera.
+/// Depth image of a frame in coarse cells, with its camera. A copy shares the cells.
 #[derive(Clone, Debug)]
 pub struct Depths {
     /// Row by row, in tenths of a metre; 0 without a reading.
-    cells: Vec<u8>,
+    cells: Arc<[u8]>,
     camera: Arc<Camera>,
 }
 
@@ -39,15 +39,19 @@ struct Limit {
 }
 
 impl Depths {
-    /// Reduces a depth image.
-    pub fn of(depth: &DepthImage, camera: &Arc<Camera>) -> Self {
+    /// Reduces the depth image of a frame; `None` without one.
+    pub fn of_frame(frame: &Frame) -> Option<Self> {
+        frame.depth().ok().map(|depth| Self::of(depth, &frame.camera))
+    }
+
+    pub(super) fn of(depth: &DepthImage, camera: &Arc<Camera>) -> Self {
         let mut cells = Vec::with_capacity(COLUMNS * ROWS);
         for row in 0..ROWS {
             for column in 0..COLUMNS {
                 cells.push(cell(depth, column, row));
             }
         }
-        Self { cells, camera: Arc::clone(camera) }
+        Self { cells: cells.into(), camera: Arc::clone(camera) }
     }
 
     /// Returns the name and the sentence of a cause that can be measured at a person without any
