@@ -130,14 +130,13 @@ impl Remedies {
     /// which each page and `doctor` explain it. Settings are those of a resolved config, two at most.
     pub fn sentence(&self, test: &str, resolved: &Table) -> String {
         let decided = self.decided(test, resolved);
-        let decided = decided.map_or(String::new(), |decided| format!("; {decided}"));
         format!("the test \"{test}\" dropped the candidate{decided}")
     }
 
-    /// Returns the settings that decide a test, two at most, with the advice on it; `None` for a test
-    /// that nothing is known about.
-    pub fn decided(&self, test: &str, resolved: &Table) -> Option<String> {
-        let remedy = self.of_config(test, resolved)?;
+    /// Returns the end of a sentence about a test: the settings that decide it, two at most, with the
+    /// advice on it; empty for a test that nothing is known about.
+    pub fn decided(&self, test: &str, resolved: &Table) -> String {
+        let Some(remedy) = self.of_config(test, resolved) else { return String::new() };
         let mut found = remedy.settings_in(resolved);
         let further = found.len().saturating_sub(MOST_SETTINGS);
         found.truncate(MOST_SETTINGS);
@@ -150,7 +149,7 @@ impl Remedies {
             };
             format!("decided by {}{further}", Setting::in_words(&found))
         };
-        Some(format!("{settings}: {}", remedy.look))
+        format!("; {settings}: {}", remedy.look)
     }
 
     /// Returns the stage of a test in a resolved config: the candidates that it drops came nearer to a

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use tagalong_app::missed::{Missed, Rules, Witness, causes};
+use tagalong_app::missed::{Missed, Rules, Witness, find_missed};
 use tagalong_app::scoring::{
     Rate, Reports, Shots, TruthFile, assemble, comparable, comparison, region, with_remedy,
 };
@@ -16,7 +16,7 @@ use tagalong_log::LogFrame;
 use tagalong_pipeline::FrameReport;
 use tagalong_report::{Dropped, EventRow, StageTiming, TaskResult, TaskTiming, Trajectory};
 
-use super::misses::tell;
+use super::misses::add_missed;
 use super::store::Recording;
 
 /// Height of people whose whole bodies are tracked, m: that of the truth of whole bodies.
@@ -151,7 +151,7 @@ fn score(
         result.lamr_curve = measured.tally.detections.curve();
     }
     let Some(measured) = image.or(metres) else { return Ok(()) };
-    tell(measured.missed, result);
+    add_missed(measured.missed, result);
     result.events = measured.events.iter().map(|event| EventRow::new(event, 0)).collect();
     Ok(())
 }
@@ -175,7 +175,7 @@ fn measure_in(
     let prepared = Prepared::new(&sequence, &comparison).map_err(|error| with_remedy(&error))?;
     let (_, matches) = Clear::measure(&prepared);
     let missed =
-        told.map(|(witness, rules)| causes(&sequence, &prepared, &matches, witness, rules));
+        told.map(|(witness, rules)| find_missed(&sequence, &prepared, &matches, witness, rules));
     let missed = missed.unwrap_or_default();
     let tally = Tally::measure(&sequence, &comparison, &SetDistance::default());
     let tally = tally.map_err(|error| error.to_string())?;

@@ -216,7 +216,7 @@ fn course(tracks: &[SightedTrack], stamp_ns: i64) -> Vec<Missed> {
     let mut witness = Witness::default();
     witness.add(2, &FrameNotes::default(), tracks.to_vec(), None);
     let rules = Rules { remedies: &remedies(), config: &config() };
-    causes(&sequence, &prepared, &matches, &witness, rules)
+    find_missed(&sequence, &prepared, &matches, &witness, rules)
 }
 
 #[test]
