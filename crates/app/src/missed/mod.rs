@@ -25,6 +25,9 @@ const NOT_BEST: &str = "not the best detection";
 /// Test that a track fails as long as its manager doubts it.
 const NOT_CONFIRMED: &str = "track: not confirmed";
 
+/// End of the sentence about a track that is seen at a person whom the comparison misses.
+const BESIDE: &str = "is seen here, but too far beside the annotated person to count as found";
+
 /// Time after which the track that was on a person is not told any more, ns.
 const RECENT_NS: i64 = 2_000_000_000;
 
@@ -162,13 +165,12 @@ impl Witness {
         if let Some(track) = here {
             let id = track.id;
             if track.stage == TrackStage::Seen {
-                return Cause::of_place(
-                    "beside the person",
-                    format!(
-                        "Track {id} is seen here, but too far beside the annotated person to count as \
-                         found."
-                    ),
-                );
+                return Cause {
+                    name: "beside the person".to_owned(),
+                    why: format!("a track {BESIDE}"),
+                    text: format!("Track {id} {BESIDE}."),
+                    ..Cause::default()
+                };
             }
             if track.stage == TrackStage::Tentative {
                 return Cause::of_unconfirmed(id, rules);
@@ -242,11 +244,6 @@ impl Witness {
 }
 
 impl Cause {
-    fn of_place(name: &str, text: String) -> Self {
-        let why = text.trim_end_matches('.').to_owned();
-        Self { name: name.to_owned(), why, text, ..Self::default() }
-    }
-
     fn of_unconfirmed(id: u32, rules: Rules<'_>) -> Self {
         let decided = rules.remedies.decided(NOT_CONFIRMED, rules.config);
         let why = format!("the track manager has not confirmed the track yet{decided}");
