@@ -206,12 +206,15 @@ impl ConfigFile {
         let replaced = self.source.document().and_then(|document| document.replaced_lists());
         let mut notes = Vec::new();
         for (list, own, inherited) in replaced.map_err(|error| self.source.mistake(&error))? {
+            let name = self.name();
+            let own = if own == 1 {
+                format!("the [[{list}]] of {name} replaces")
+            } else {
+                format!("the {own} [[{list}]] of {name} replace")
+            };
             notes.push(format!(
-                "{} [[{list}]] of {} {} all {inherited} of the config that it extends; to change one \
-                 setting, write `{list}.0.config.KEY = VALUE`, counted from 0",
-                if own == 1 { "the".to_owned() } else { format!("the {own}") },
-                self.name(),
-                if own == 1 { "replaces" } else { "replace" },
+                "{own} all {inherited} of the config that it extends; to change one setting, write \
+                 `{list}.0.config.KEY = VALUE`, counted from 0"
             ));
         }
         Ok(notes)

@@ -1,6 +1,7 @@
 //! Logs and scenes that a config was not made for, by its `[suits]`.
 
 use tagalong_log::FrameSource;
+use tagalong_math::counted;
 use tagalong_pipeline::Suits;
 
 /// Deviation of the pitch of the camera from the stated range that does not matter, degrees.
@@ -92,29 +93,24 @@ pub fn misfit_note(config: &str, unsuited: &[(String, Vec<String>)]) -> Option<S
 /// Returns one note for all configs: that of [`misfit_note`] where a single one does not suit some logs,
 /// and the names of several with their numbers of logs; `None` if each suits all.
 pub fn misfits_note(configs: &[(String, LogMisfits)]) -> Option<String> {
-    let mut unsuited = Vec::new();
+    let mut each = Vec::new();
+    let mut last = None;
     for (config, logs) in configs {
         let count = logs.iter().filter(|(_, misfits)| !misfits.is_empty()).count();
         if count > 0 {
-            unsuited.push((config, logs, count));
+            each.push(format!("{config} ({})", counted(count, "log")));
+            last = Some((config, logs));
         }
     }
-    if let [(config, logs, _)] = unsuited[..] {
+    let (config, logs) = last?;
+    if each.len() == 1 {
         return misfit_note(config, logs);
     }
-    let each: Vec<String> = unsuited
-        .iter()
-        .map(|(config, _, count)| {
-            format!("{config} ({count} {})", if *count == 1 { "log" } else { "logs" })
-        })
-        .collect();
-    (!each.is_empty()).then(|| {
-        format!(
-            "{} configs are by their [suits] not made for some of the logs, where tracks are worse: {}",
-            each.len(),
-            each.join(", ")
-        )
-    })
+    Some(format!(
+        "{} configs are by their [suits] not made for some of the logs, where tracks are worse: {}",
+        each.len(),
+        each.join(", ")
+    ))
 }
 
 #[cfg(test)]

@@ -113,24 +113,30 @@ impl Remedies {
     /// Returns the remedy for a test in a resolved config: that of a plugin that the config has, or else
     /// that of the pipeline.
     pub fn of_config(&self, test: &str, resolved: &Table) -> Option<&Remedy> {
-        let of_plugins = self.drop.iter().filter(|remedy| remedy.plugin.is_some());
-        let mut fitting = of_plugins.filter(|remedy| remedy.is_for(test));
-        let fitting = fitting.find(|remedy| !remedy.settings_in(resolved).is_empty());
-        fitting.or_else(|| self.of(test))
+        self.drop.get(self.place_of(test, resolved)?)
+    }
+
+    /// Returns the position of [`Remedies::of_config`] among all remedies.
+    fn place_of(&self, test: &str, resolved: &Table) -> Option<usize> {
+        let of_plugin = self.drop.iter().position(|remedy| {
+            remedy.plugin.is_some()
+                && remedy.is_for(test)
+                && !remedy.settings_in(resolved).is_empty()
+        });
+        of_plugin.or_else(|| self.drop.iter().position(|remedy| remedy.is_for(test)))
     }
 
     /// Returns the sentence that says why a test dropped a person, and the settings that decide it, by
     /// which each page and `doctor` explain it. Settings are those of a resolved config, two at most.
     pub fn sentence(&self, test: &str, resolved: &Table) -> String {
         let decided = self.decided(test, resolved);
-        let decided = decided.map_or(String::new(), |decided| format!("; {decided}"));
         format!("the test \"{test}\" dropped the candidate{decided}")
     }
 
-    /// Returns the settings that decide a test, two at most, with the advice on it; `None` for a test
-    /// that nothing is known about.
-    pub fn decided(&self, test: &str, resolved: &Table) -> Option<String> {
-        let remedy = self.of_config(test, resolved)?;
+    /// Returns the end of a sentence about a test: the settings that decide it, two at most, with the
+    /// advice on it; empty for a test that nothing is known about.
+    pub fn decided(&self, test: &str, resolved: &Table) -> String {
+        let Some(remedy) = self.of_config(test, resolved) else { return String::new() };
         let mut found = remedy.settings_in(resolved);
         let further = found.len().saturating_sub(MOST_SETTINGS);
         found.truncate(MOST_SETTINGS);
@@ -143,7 +149,7 @@ impl Remedies {
             };
             format!("decided by {}{further}", Setting::in_words(&found))
         };
-        Some(format!("{settings}: {}", remedy.look))
+        format!("; {settings}: {}", remedy.look)
     }
 
     /// Returns the stage of a test in a resolved config: the candidates that it drops came nearer to a
@@ -151,13 +157,10 @@ impl Remedies {
     /// then those that no table has, those of the pipeline, and those of its other plugins.
     pub fn stage(&self, test: &str, resolved: &Table) -> usize {
         let all = self.drop.len();
-        let Some(remedy) = self.of_config(test, resolved) else { return all };
-        let place = self.drop.iter().position(|other| std::ptr::eq(other, remedy));
-        let place = place.unwrap_or(all);
-        let plugin = remedy.plugin.as_deref();
-        let detectors = resolved.get("detectors").and_then(Value::as_array);
-        let mut detectors = detectors.into_iter().flatten().filter_map(|one| one.get("plugin"));
-        let is_detectors = plugin.is_some() && detectors.any(|one| one.as_str() == plugin);
+        let Some(place) = self.place_of(test, resolved) else { return all };
+        let plugin = self.drop[place].plugin.as_deref();
+        let mut detectors = sections(resolved).filter(|section| section.name == "detectors");
+        let is_detectors = plugin.is_some() && detectors.any(|one| one.plugin() == plugin);
         if is_detectors { place } else { all + 1 + place }
     }
 
@@ -223,32 +226,66 @@ fn keys_of<'a>(
     plugin: &str,
     setting: &str,
 ) -> Vec<(String, Option<&'a Value>)> {
-    let mut sections: Vec<(String, &'a Value)> = Vec::new();
-    for (name, value) in resolved {
-        match value {
-            Value::Array(items) => {
-                sections
-                    .extend(items.iter().enumerate().map(|(at, it)| (format!("{name}.{at}"), it)));
-            }
-            value => sections.push((name.clone(), value)),
-        }
-    }
     let mut keys = Vec::new();
-    for (path, section) in sections {
-        if section.get("plugin").and_then(Value::as_str) == Some(plugin) {
-            let now = section.get("config").and_then(|config| config.get(setting));
-            keys.push((format!("{path}.config.{setting}"), now));
-        }
+    for section in sections(resolved).filter(|section| section.plugin() == Some(plugin)) {
+        keys.push((format!("{}.config.{setting}", section.path()), section.setting(setting)));
     }
     keys
 }
 
-/// Returns true if a value, or each part of it that is given, is the present one.
-pub fn is_present(value: &Value, now: &Value) -> bool {
-    fn number(value: &Value) -> Option<f64> {
-        value.as_float().or_else(|| value.as_integer().map(|v| v as f64))
+/// Section of a resolved config: a table, or an entry of a list of tables.
+pub(crate) struct Section<'a> {
+    pub(crate) name: &'a str,
+    /// Position in the list; none for a table that is no entry.
+    at: Option<usize>,
+    table: &'a Table,
+}
+
+/// Returns the sections of a resolved config in its order.
+pub(crate) fn sections(resolved: &Table) -> impl Iterator<Item = Section<'_>> {
+    resolved.iter().flat_map(|(name, value)| {
+        let entries = value.as_array().into_iter().flatten().enumerate();
+        let entries = entries.map(|(at, entry)| (Some(at), entry));
+        let all = std::iter::once((None, value)).chain(entries);
+        all.filter_map(|(at, value)| Some(Section { name, at, table: value.as_table()? }))
+    })
+}
+
+impl<'a> Section<'a> {
+    /// Returns the name of its plugin, if it has one.
+    pub(crate) fn plugin(&self) -> Option<&'a str> {
+        self.table.get("plugin").and_then(Value::as_str)
     }
 
+    /// Returns the value of a setting of its plugin.
+    pub(crate) fn setting(&self, key: &str) -> Option<&'a Value> {
+        self.table.get("config")?.get(key)
+    }
+
+    /// Returns the dotted path, for example `manager` or `detectors.0`.
+    pub(crate) fn path(&self) -> String {
+        match self.at {
+            Some(at) => format!("{}.{at}", self.name),
+            None => self.name.to_owned(),
+        }
+    }
+
+    /// Returns the header that leads to the section; an entry of a list has its path instead.
+    fn header(&self) -> String {
+        match self.at {
+            Some(_) => self.path(),
+            None => format!("[{}]", self.name),
+        }
+    }
+}
+
+/// Returns a value as a number, if it is one.
+pub fn number(value: &Value) -> Option<f64> {
+    value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
+}
+
+/// Returns true if a value, or each part of it that is given, is the present one.
+pub fn is_present(value: &Value, now: &Value) -> bool {
     match (value, now) {
         (Value::Table(value), Value::Table(now)) => {
             value.iter().all(|(key, value)| now.get(key).is_some_and(|now| is_present(value, now)))
@@ -311,52 +348,42 @@ impl Remedy {
 
     /// Returns the settings in the order of the sections.
     fn settings_in(&self, resolved: &Table) -> Vec<Setting> {
-        let mut found = Vec::new();
-        for (section, value) in resolved {
-            match value {
-                Value::Array(items) => {
-                    let tables = items.iter().enumerate();
-                    for (at, table) in tables.filter_map(|(at, item)| Some((at, item.as_table()?)))
-                    {
-                        self.section(&format!("{section}.{at}"), table, &mut found);
-                    }
-                }
-                Value::Table(table) => self.section(&format!("[{section}]"), table, &mut found),
-                _ => {}
-            }
-        }
-        found
+        sections(resolved).flat_map(|section| self.settings_of(&section)).collect()
     }
 
-    /// Adds the settings in one section: its own keys, or those of its plugin.
-    fn section(&self, name: &str, table: &Table, found: &mut Vec<Setting>) {
-        let plugin = table.get("plugin").and_then(Value::as_str);
+    /// Returns the settings in one section: its own keys, or those of its plugin.
+    fn settings_of(&self, section: &Section<'_>) -> Vec<Setting> {
+        let plugin = section.plugin();
         if plugin.is_some() && self.plugin.is_some() && self.plugin.as_deref() != plugin {
-            return;
+            return Vec::new();
         }
-        let config = table.get("config").and_then(Value::as_table);
+        let mut found = Vec::new();
         for setting in &self.settings {
             let (place, key) = setting.split_once('.').unwrap_or(("", setting));
-            if !place.is_empty() && name != format!("[{place}]") {
+            if !place.is_empty() && (section.at.is_some() || section.name != place) {
                 continue;
             }
             let value = match plugin {
-                Some(_) => config.and_then(|config| config.get(key)),
-                None => table.get(key),
+                Some(_) => section.setting(key),
+                None => section.table.get(key),
             };
             found.extend(value.map(|value| Setting {
-                section: name.to_owned(),
+                section: section.header(),
+                is_entry: section.at.is_some(),
                 plugin: plugin.map(ToOwned::to_owned),
                 assignment: format!("{key} = {value}"),
             }));
         }
+        found
     }
 }
 
 /// Setting with its place in a config.
 struct Setting {
-    /// Header of the section.
+    /// Header of the section, or the path of an entry.
     section: String,
+    /// True where the section is an entry of a list.
+    is_entry: bool,
     /// Plugin that has the setting; none for the pipeline's.
     plugin: Option<String>,
     /// Key and value.
@@ -373,21 +400,22 @@ impl Setting {
     /// Returns the line of settings of one section and plugin; those of an entry of a list as a config
     /// that extends this one changes them.
     fn line(settings: &[Self]) -> String {
-        let Some(first) = settings.first() else { return String::new() };
+        let Some(Self { section, is_entry, plugin, .. }) = settings.first() else {
+            return String::new();
+        };
         let values: Vec<&str> = settings.iter().map(|one| one.assignment.as_str()).collect();
-        let section = &first.section;
-        match &first.plugin {
-            Some(plugin) if !section.starts_with('[') => {
+        match (plugin, is_entry) {
+            (Some(plugin), true) => {
                 let values = match values[..] {
                     [value] => format!(".{value}"),
                     _ => format!(" = {{ {} }}", values.join(", ")),
                 };
                 format!("{section}.config{values} ({plugin})")
             }
-            Some(plugin) => {
+            (Some(plugin), false) => {
                 format!("{section} plugin = \"{plugin}\", config = {{ {} }}", values.join(", "))
             }
-            None => format!("{section} {}", values.join(" and ")),
+            (None, _) => format!("{section} {}", values.join(" and ")),
         }
     }
 }

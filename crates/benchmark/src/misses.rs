@@ -2,20 +2,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use tagalong_app::missed::Missed;
+use tagalong_app::missed::{Missed, sentences_of};
 use tagalong_report::{MissedPerson, TaskResult};
 
-/// Adds the people that count and have no track in a frame to a result, each with its cause. A sentence
-/// is kept once, whatever the number of frames that it is about.
-pub fn tell(causes: Vec<Missed>, result: &mut TaskResult) {
-    let mut places: BTreeMap<String, usize> = BTreeMap::new();
-    for Missed { at, person, cause } in causes {
+/// Adds the people that count and have no track in a frame to a result, each with its cause.
+pub fn add_missed(missed: Vec<Missed>, result: &mut TaskResult) {
+    let (sentences, places) = sentences_of(&missed);
+    result.causes = sentences;
+    for (Missed { at, person, cause }, place) in missed.into_iter().zip(places) {
         result.reasons.insert(cause.name.clone(), cause.why);
-        let sentences = &mut result.causes;
-        let place = *places.entry(cause.text).or_insert_with_key(|text| {
-            sentences.push(text.clone());
-            sentences.len() - 1
-        });
         result.missed.push(MissedPerson {
             frame: at as u64 + 1,
             person,
@@ -68,7 +63,7 @@ mod tests {
         let causes = [size.clone(), far, size].into_iter().enumerate();
         let causes = causes.map(|(at, cause)| Missed { at, person: 4, cause }).collect();
         let mut result = TaskResult::default();
-        tell(causes, &mut result);
+        add_missed(causes, &mut result);
         assert_eq!(result.causes, ["No track began: size.", "No track began: too far."]);
         let told: Vec<_> = result.missed.iter().map(|m| (m.frame, m.cause, m.name())).collect();
         assert_eq!(

@@ -384,7 +384,7 @@ pub fn with_truth(log: &Path) -> Result<Annotated, Failure> {
     })
 }
 
-/// Returns the way to truth for a log that has none. Nobody can be annotated in scans alone.
+/// Returns the way to truth for a log that has none: people cannot be annotated in scans alone.
 fn makes_truth(log: &Path) -> String {
     let settings = InputSettings::default();
     let opened = FrameSource::open(log, &settings, &Limits::default(), Inputs::ANY);

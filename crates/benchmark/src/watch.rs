@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use tagalong_app::missed::{Missed, Rules, Witness, causes};
+use tagalong_app::missed::{Missed, Rules, Witness, find_missed};
 use tagalong_app::scoring::{
     Rate, Reports, Shots, TruthFile, assemble, comparable, comparison, region, with_remedy,
 };
@@ -16,7 +16,7 @@ use tagalong_log::LogFrame;
 use tagalong_pipeline::FrameReport;
 use tagalong_report::{Dropped, EventRow, StageTiming, TaskResult, TaskTiming, Trajectory};
 
-use super::misses::tell;
+use super::misses::add_missed;
 use super::store::Recording;
 
 /// Height of people whose whole bodies are tracked, m: that of the truth of whole bodies.
@@ -31,7 +31,6 @@ pub struct Watch {
     reports: Reports,
     paths: BTreeMap<i64, Vec<(u32, [f64; 2])>>,
     funnel: Funnel,
-    witness: Witness,
     nis: Vec<(f64, u32)>,
     frames: u64,
     times: Timings,
@@ -50,7 +49,6 @@ impl Watch {
         }
         self.frames += 1;
         let number = u32::try_from(report.index).unwrap_or(u32::MAX);
-        self.witness.take(item, report);
         // A track that is only predicted has no box that could be scored.
         for track in report.tracks.iter().filter(|track| track.confirmed && track.seen) {
             self.track(item, number, track);
@@ -106,8 +104,8 @@ impl Watch {
         }
     }
 
-    /// Scores everything. `result` already names the task. The causes of missed people are told by
-    /// the rules of the run, if there are any.
+    /// Scores everything. `result` already names the task. The causes of missed people are told where
+    /// a witness of the run is given, with its rules.
     ///
     /// # Errors
     /// Truth that contradicts itself, in a sentence.
@@ -116,7 +114,7 @@ impl Watch {
         truth: &TruthFile,
         shots: &Shots,
         mut result: TaskResult,
-        rules: Option<Rules<'_>>,
+        told: Option<(&Witness, Rules<'_>)>,
     ) -> Result<(TaskResult, Recording), String> {
         result.frames = self.frames;
         result.duration_s = shots.duration_s();
@@ -127,7 +125,7 @@ impl Watch {
         result.tracks = paths(self.paths, shots);
         let sequence = assemble(&result.log, truth, shots, self.reports, Rate(1.0));
         result.truth = truth_paths(&sequence, shots);
-        score(&sequence, truth, rules.map(|rules| (&self.witness, rules)), &mut result)?;
+        score(&sequence, truth, told, &mut result)?;
         let size = shots.at(1).map_or((0, 0), |shot| (shot.camera.width, shot.camera.height));
         let width = size.0 as u32;
         let height = size.1 as u32;
@@ -153,7 +151,7 @@ fn score(
         result.lamr_curve = measured.tally.detections.curve();
     }
     let Some(measured) = image.or(metres) else { return Ok(()) };
-    tell(measured.missed, result);
+    add_missed(measured.missed, result);
     result.events = measured.events.iter().map(|event| EventRow::new(event, 0)).collect();
     Ok(())
 }
@@ -177,7 +175,7 @@ fn measure_in(
     let prepared = Prepared::new(&sequence, &comparison).map_err(|error| with_remedy(&error))?;
     let (_, matches) = Clear::measure(&prepared);
     let missed =
-        told.map(|(witness, rules)| causes(&sequence, &prepared, &matches, witness, rules));
+        told.map(|(witness, rules)| find_missed(&sequence, &prepared, &matches, witness, rules));
     let missed = missed.unwrap_or_default();
     let tally = Tally::measure(&sequence, &comparison, &SetDistance::default());
     let tally = tally.map_err(|error| error.to_string())?;

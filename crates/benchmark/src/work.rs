@@ -6,7 +6,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use tagalong_app::missed::Rules;
+use tagalong_app::missed::{Depths, Rules, Witness};
 use tagalong_app::outcome::{Failure, say};
 use tagalong_app::progress::Forecast;
 use tagalong_app::remedies::Remedies;
@@ -14,8 +14,8 @@ use tagalong_app::scoring::{Shot, Shots, TruthFile, TruthOptions, truth_notes};
 use tagalong_app::signals::Signals;
 use tagalong_app::unable::unable;
 use tagalong_config::Registry;
-use tagalong_log::{FrameSource, Input, Inputs};
-use tagalong_pipeline::Pipeline;
+use tagalong_log::{FrameSource, Input, Inputs, LogFrame};
+use tagalong_pipeline::{FrameReport, Pipeline};
 use tagalong_report::{Outcome, TaskResult};
 
 use super::args::{RunArgs, Shard};
@@ -272,21 +272,29 @@ impl Desk<'_> {
             })
         });
         let mut lanes: Vec<Lane> = lanes.collect();
+        let mut witnesses = vec![Witness::default(); lanes.len()];
         let mut shots = Shots::default();
         while let Some(item) = source.next_frame() {
             if self.signals.received().is_some() {
                 return Ok(None);
             }
             shots.push(Shot::of(&item));
-            lanes.iter_mut().for_each(|lane| lane.step(&item));
+            let depths = Depths::of_frame(&item.frame);
+            for (lane, witness) in lanes.iter_mut().zip(&mut witnesses) {
+                let report = lane.step(&item).filter(|report| report.outcome.is_processed());
+                if let Some(report) = report {
+                    witness.take(&item, &report, depths.clone());
+                }
+            }
         }
         let lost = source.data_lost();
         let notes = notes_on(first, &truth, &shots);
         let remedies = Remedies::new(self.registry);
         let mut stored = Vec::new();
         let mut timings = Vec::new();
-        for (ready, lane) in group.iter().zip(lanes) {
-            let (result, timing) = lane.finish(&ready.task, &truth, &shots, lost, &remedies);
+        for ((ready, lane), witness) in group.iter().zip(lanes).zip(witnesses) {
+            let told = (&witness, &remedies);
+            let (result, timing) = lane.finish(&ready.task, &truth, &shots, lost, told);
             stored.push(Stored { notes: notes.clone(), ..result });
             timings.push(timing);
         }
@@ -338,12 +346,18 @@ impl Lane {
         Self { pipeline, watch: Watch::default() }
     }
 
-    /// Passes it the next frame. A pipeline that failed takes no more of them.
-    pub fn step(&mut self, item: &tagalong_log::LogFrame) {
-        let Ok(pipeline) = &mut self.pipeline else { return };
+    /// Passes it the next frame, and returns its report. A pipeline that failed takes no more of them.
+    pub fn step(&mut self, item: &LogFrame) -> Option<FrameReport> {
+        let pipeline = self.pipeline.as_mut().ok()?;
         match pipeline.step(&item.frame) {
-            Ok(report) => self.watch.take(item, &report),
-            Err(error) => self.pipeline = Err(error.to_string()),
+            Ok(report) => {
+                self.watch.take(item, &report);
+                Some(report)
+            }
+            Err(error) => {
+                self.pipeline = Err(error.to_string());
+                None
+            }
         }
     }
 
@@ -353,7 +367,7 @@ impl Lane {
         truth: &TruthFile,
         shots: &Shots,
         lost: bool,
-        remedies: &Remedies,
+        (witness, remedies): (&Witness, &Remedies),
     ) -> Kept {
         let pipeline = match &self.pipeline {
             Ok(pipeline) => pipeline,
@@ -364,11 +378,11 @@ impl Lane {
         let timing = self.watch.timing();
         let timing = StoredTiming { hash, machine: machine(), timing };
         let blank = TaskResult { data_lost: lost, ..blank(task) };
-        let scored =
-            self.watch.score(truth, shots, blank, Some(rules)).and_then(|(result, recording)| {
-                let repairs = repaired(&recording.sequence, truth)?;
-                Ok((TaskResult { repairs, ..result }, recording))
-            });
+        let scored = self.watch.score(truth, shots, blank, Some((witness, rules)));
+        let scored = scored.and_then(|(result, recording)| {
+            let repairs = repaired(&recording.sequence, truth)?;
+            Ok((TaskResult { repairs, ..result }, recording))
+        });
         match scored {
             Ok((result, recording)) => {
                 let tests = result.funnel.iter().map(|dropped| dropped.test.as_str());

@@ -1,5 +1,6 @@
 //! Remedies that would change nothing: settings that a config has already.
 
+use tagalong_app::remedies::number;
 use toml::{Table, Value};
 
 /// Words that lead to a setting, and lead nowhere without one.
@@ -72,8 +73,7 @@ fn digits(literal: &str) -> i32 {
 
 /// Compares numbers to the printed digits, other values as they are.
 fn is_equal(value: &Value, now: &Value, digits: i32) -> bool {
-    let [a, b] = [value, now].map(|it| it.as_float().or_else(|| it.as_integer().map(|v| v as f64)));
-    match (a, b) {
+    match (number(value), number(now)) {
         (Some(a), Some(b)) => (a - b).abs() <= 0.5 * 10f64.powi(-digits) * (1.0 - 1e-6),
         _ => value == now,
     }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use tagalong_app::missed::Witness;
+use tagalong_app::missed::{Depths, Witness};
 use tagalong_core::{Frame, Funnel, RgbImage};
 use tagalong_geometry::Rect;
 use tagalong_log::LogFrame;
@@ -63,7 +63,7 @@ impl Trial {
     fn take(&mut self, item: &LogFrame, report: FrameReport, with_pictures: bool) {
         self.course.take(&report, &item.odom_from_robot);
         self.funnel.merge(&report.funnel);
-        self.witness.take(item, &report);
+        self.witness.take(item, &report, Depths::of_frame(&item.frame));
         if !with_pictures {
             return;
         }

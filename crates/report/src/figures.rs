@@ -80,11 +80,15 @@ impl Figure {
 /// Different scores of which the miss rate over false reports is a curve: of fewer it is some points.
 pub const FEW_SCORES: u64 = 10;
 
+/// Returns true if the reports have so few different scores that figures over them tell little.
+pub fn has_few_scores(scores: &Scores) -> bool {
+    // Results of earlier versions did not count them.
+    (1..FEW_SCORES).contains(&scores.distinct_scores)
+}
+
 /// Returns the figure unless the reports have so few scores that it tells little.
 pub fn lamr_of_enough_scores(scores: &Scores) -> Option<f64> {
-    // Results of earlier versions did not count them.
-    let are_few = (1..FEW_SCORES).contains(&scores.distinct_scores);
-    scores.lamr.filter(|_| !are_few)
+    scores.lamr.filter(|_| !has_few_scores(scores))
 }
 
 /// Figure that ranks the pipelines.

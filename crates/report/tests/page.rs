@@ -153,19 +153,26 @@ fn what_is_no_number_is_left_out() {
 
 #[test]
 fn a_miss_rate_from_constant_scores_says_that_it_means_nothing() {
-    let mut benchmark = two_by_three();
-    assert!(!html(&benchmark, None).contains("mean nothing"));
-    let task = &mut benchmark.tasks[0];
-    let scores = task.image.unwrap();
-    task.image = Some(Scores { distinct_scores: 9, reports: 20, ..scores });
-    let said = format!("{} on {}", task.pipeline, task.log);
-    let few = Summary::new(&benchmark);
-    let logs =
-        |of: &Summary| of.pipelines.iter().map(|p| p.figures["image.LAMR"].logs).sum::<u64>();
-    assert_eq!(logs(&few) + 1, logs(&Summary::new(&two_by_three())), "9 scores are too few");
-    let page = html(&benchmark, None);
-    let note = page.split("mean nothing").nth(1).unwrap();
-    assert!(note.split("</p>").next().unwrap().ends_with(&format!("{said}.")), "{said}");
+    assert!(!html(&two_by_three(), None).contains("mean nothing"));
+    let all = logs_with_lamr(&two_by_three());
+    for (distinct_scores, reports, are_few) in [(1, 9, true), (9, 20, true), (10, 20, false)] {
+        let mut benchmark = two_by_three();
+        let task = &mut benchmark.tasks[0];
+        let scores = task.image.expect("figures in the image");
+        task.image = Some(Scores { distinct_scores, reports, ..scores });
+        let said = format!("{} on {}.", task.pipeline, task.log);
+        let left_out = all - logs_with_lamr(&benchmark);
+        assert_eq!(left_out, u64::from(are_few), "{distinct_scores} scores");
+        let page = html(&benchmark, None);
+        let note = page.split("mean nothing").nth(1).and_then(|note| note.split("</p>").next());
+        assert_eq!(note.is_some(), are_few, "{distinct_scores} scores");
+        assert!(note.is_none_or(|note| note.ends_with(&said)), "{said}: {note:?}");
+    }
+}
+
+/// The logs with a LAMR, over all pipelines.
+fn logs_with_lamr(benchmark: &Benchmark) -> u64 {
+    Summary::new(benchmark).pipelines.iter().map(|p| p.figures["image.LAMR"].logs).sum()
 }
 
 #[test]

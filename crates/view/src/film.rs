@@ -139,7 +139,7 @@ impl Film {
         if frame.camera.is_blind() {
             return;
         }
-        self.depths[at] = frame.depth().ok().map(|depth| Depths::of(depth, &frame.camera));
+        self.depths[at] = Depths::of_frame(frame);
         if self.view_rad.is_none() && frame.camera.panorama().is_none() {
             self.view_rad = Some(view_edges(&frame.camera));
         }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use nalgebra::{Isometry2, Point2};
-use tagalong_app::missed::{Missed, Rules, Witness, causes};
+use tagalong_app::missed::{Missed, Rules, Witness, find_missed, sentences_of};
 use tagalong_app::outcome::Failure;
 use tagalong_app::scoring::{
     Shots, TruthFile, TruthOptions, comparable, comparison, other_log_notes,
@@ -94,7 +94,7 @@ impl PageTruth {
             hits.push(on);
         }
         run.hits = Some(hits);
-        tell(causes(&sequence, &prepared, &matches, witness, rules), run);
+        add_missed(&find_missed(&sequence, &prepared, &matches, witness, rules), run);
         let happened = events(&prepared, &matches);
         run.events.extend(happened.iter().filter_map(described));
         run.events.sort_by_key(|event| event.i);
@@ -112,16 +112,12 @@ impl PageTruth {
     }
 }
 
-/// Adds the causes of the misses to a run, each sentence once.
-fn tell(causes: Vec<Missed>, run: &mut RunData) {
-    let mut places: BTreeMap<String, usize> = BTreeMap::new();
-    for Missed { at, person, cause } in causes {
-        let sentences = &mut run.causes;
-        let place = *places.entry(cause.text).or_insert_with_key(|text| {
-            sentences.push(text.clone());
-            sentences.len() - 1
-        });
-        run.missed.entry(at).or_default().insert(person, place);
+/// Adds the missed people to a run, with the causes.
+fn add_missed(missed: &[Missed], run: &mut RunData) {
+    let (sentences, places) = sentences_of(missed);
+    run.causes = sentences;
+    for (one, place) in missed.iter().zip(places) {
+        run.missed.entry(one.at).or_default().insert(one.person, place);
     }
 }
 

@@ -188,7 +188,7 @@ mod tests {
                 crowd: Some(view),
                 approach: None,
                 reason: None,
-                is_still: false,
+                effect: "stands",
             });
         }
         ticks

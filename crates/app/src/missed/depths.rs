@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use tagalong_core::DepthImage;
+use tagalong_core::{DepthImage, Frame};
 use tagalong_geometry::{Camera, Rect};
-use toml::{Table, Value};
 
 use super::Rules;
+use crate::remedies::{number, sections};
 
 /// Columns and rows of cells.
 const COLUMNS: usize = 32;
@@ -24,11 +24,11 @@ const LEAST_SHARE: f64 = 0.2;
 /// Part of a box, about its centre, in which the person is in front.
 const CORE: f64 = 0.5;
 
-/// Depth image of a frame in coarse cells, with its camera.
+/// Depth image of a frame in coarse cells, with its camera. A copy shares the cells.
 #[derive(Clone, Debug)]
 pub struct Depths {
     /// Row by row, in tenths of a metre; 0 without a reading.
-    cells: Vec<u8>,
+    cells: Arc<[u8]>,
     camera: Arc<Camera>,
 }
 
@@ -39,15 +39,19 @@ struct Limit {
 }
 
 impl Depths {
-    /// Reduces a depth image.
-    pub fn of(depth: &DepthImage, camera: &Arc<Camera>) -> Self {
+    /// Reduces the depth image of a frame; `None` without one.
+    pub fn of_frame(frame: &Frame) -> Option<Self> {
+        frame.depth().ok().map(|depth| Self::of(depth, &frame.camera))
+    }
+
+    pub(super) fn of(depth: &DepthImage, camera: &Arc<Camera>) -> Self {
         let mut cells = Vec::with_capacity(COLUMNS * ROWS);
         for row in 0..ROWS {
             for column in 0..COLUMNS {
                 cells.push(cell(depth, column, row));
             }
         }
-        Self { cells, camera: Arc::clone(camera) }
+        Self { cells: cells.into(), camera: Arc::clone(camera) }
     }
 
     /// Returns the name and the sentence of a cause that can be measured at a person without any
@@ -108,40 +112,39 @@ impl Depths {
 
 /// Returns the median of a cell's readings, 0 if less than half of them are there.
 fn cell(depth: &DepthImage, column: usize, row: usize) -> u8 {
-    let mut readings: Vec<f32> = Vec::with_capacity(TAPS * TAPS);
+    // An array instead of a vector saves an allocation per cell.
+    let mut readings = [f32::INFINITY; TAPS * TAPS];
+    let mut count = 0;
     for tap in 0..TAPS * TAPS {
         let x = (column * TAPS + tap % TAPS) * depth.width() / (COLUMNS * TAPS);
         let y = (row * TAPS + tap / TAPS) * depth.height() / (ROWS * TAPS);
         let metres = depth.get(x as i64, y as i64);
-        readings.extend(metres.filter(|metres| metres.is_finite() && *metres > 0.0));
+        if let Some(metres) = metres.filter(|metres| DepthImage::is_reading(*metres)) {
+            readings[count] = metres;
+            count += 1;
+        }
     }
-    if readings.len() * 2 < TAPS * TAPS {
+    if count * 2 < TAPS * TAPS {
         return 0;
     }
-    readings.sort_unstable_by(f32::total_cmp);
-    (readings[readings.len() / 2] * UNITS).round().clamp(1.0, 255.0) as u8
+    readings[..count].sort_unstable_by(f32::total_cmp);
+    (readings[count / 2] * UNITS).round().clamp(1.0, 255.0) as u8
 }
 
 /// Returns the limit of the detectors together, if all of them have it.
 fn limit(rules: Rules<'_>, key: &str, wider: fn(f64, f64) -> f64) -> Option<Limit> {
-    let detectors = rules.config.get("detectors").and_then(Value::as_array)?;
     let mut widest: Option<Limit> = None;
-    for (at, detector) in detectors.iter().enumerate() {
-        let config = detector.get("config").and_then(Value::as_table)?;
-        let value = number(config, key)?;
+    for detector in sections(rules.config).filter(|section| section.name == "detectors") {
+        let value = detector.setting(key).and_then(number)?;
         let is_wider = widest.as_ref().is_none_or(|one| wider(one.value, value) != one.value);
         if is_wider {
-            let plugin = detector.get("plugin").and_then(Value::as_str).unwrap_or_default();
-            let line = format!("detectors.{at}.config.{key} = {value:?} ({plugin})");
+            let path = detector.path();
+            let plugin = detector.plugin().unwrap_or_default();
+            let line = format!("{path}.config.{key} = {value:?} ({plugin})");
             widest = Some(Limit { value, line });
         }
     }
     widest
-}
-
-fn number(config: &Table, key: &str) -> Option<f64> {
-    let value = config.get(key)?;
-    value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
 }
 
 fn outside(words: &str, than: &str, limit: &Limit) -> String {

@@ -1,7 +1,7 @@
 //! Cause for which a person has no reported track in a frame. It is the one rule of the page of `view`,
 //! the report of `bench` and `doctor`, which all say the same sentence.
 //!
-//! A [`Witness`] keeps what a run says about each frame; [`causes`] looks there for each person that a
+//! A [`Witness`] keeps what a run says about each frame; [`find_missed`] looks there for each person that a
 //! comparison with the truth misses, and [`Witness::cause_at`] for any other place.
 
 mod depths;
@@ -24,6 +24,9 @@ const NOT_BEST: &str = "not the best detection";
 
 /// Test that a track fails as long as its manager doubts it.
 const NOT_CONFIRMED: &str = "track: not confirmed";
+
+/// End of the sentence about a track that is seen at a person whom the comparison misses.
+const BESIDE: &str = "is seen here, but too far beside the annotated person to count as found";
 
 /// Time after which the track that was on a person is not told any more, ns.
 const RECENT_NS: i64 = 2_000_000_000;
@@ -86,7 +89,7 @@ pub struct Missed {
 
 /// Returns the people that count and have no track, frame by frame, each with the cause. The witness has
 /// the frames of the sequence by their numbers, from 1.
-pub fn causes(
+pub fn find_missed(
     sequence: &Sequence,
     prepared: &Prepared,
     matches: &[Vec<Match>],
@@ -126,6 +129,21 @@ pub fn causes(
     all
 }
 
+/// Returns the sentences of causes, each once, and for each cause the position of its sentence.
+pub fn sentences_of(missed: &[Missed]) -> (Vec<String>, Vec<usize>) {
+    let mut sentences: Vec<String> = Vec::new();
+    let mut known: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut places = Vec::new();
+    for Missed { cause, .. } in missed {
+        let place = *known.entry(&cause.text).or_insert(sentences.len());
+        if place == sentences.len() {
+            sentences.push(cause.text.clone());
+        }
+        places.push(place);
+    }
+    (sentences, places)
+}
+
 impl Witness {
     /// Returns the cause for which nobody is reported at a place. Tracks that are seen elsewhere and
     /// overlap it in the image are other people.
@@ -147,13 +165,12 @@ impl Witness {
         if let Some(track) = here {
             let id = track.id;
             if track.stage == TrackStage::Seen {
-                return Cause::of_place(
-                    "beside the person",
-                    format!(
-                        "Track {id} is seen here, but too far beside the annotated person to count as \
-                         found."
-                    ),
-                );
+                return Cause {
+                    name: "beside the person".to_owned(),
+                    why: format!("a track {BESIDE}"),
+                    text: format!("Track {id} {BESIDE}."),
+                    ..Cause::default()
+                };
             }
             if track.stage == TrackStage::Tentative {
                 return Cause::of_unconfirmed(id, rules);
@@ -166,8 +183,8 @@ impl Witness {
                 track.id
             ),
             (None, Some(Former { id, .. })) => {
-                let tracks = self.tracks(number).iter();
-                let is_elsewhere = tracks.into_iter().any(|track| i64::from(track.id) == id);
+                let mut tracks = self.tracks(number).iter();
+                let is_elsewhere = tracks.any(|track| i64::from(track.id) == id);
                 let course = if is_elsewhere { "was here and is elsewhere now" } else { "ended" };
                 format!("Track {id} {course}, and no new one began")
             }
@@ -227,14 +244,8 @@ impl Witness {
 }
 
 impl Cause {
-    fn of_place(name: &str, text: String) -> Self {
-        let why = text.trim_end_matches('.').to_owned();
-        Self { name: name.to_owned(), why, text, ..Self::default() }
-    }
-
     fn of_unconfirmed(id: u32, rules: Rules<'_>) -> Self {
         let decided = rules.remedies.decided(NOT_CONFIRMED, rules.config);
-        let decided = decided.map_or(String::new(), |decided| format!("; {decided}"));
         let why = format!("the track manager has not confirmed the track yet{decided}");
         Self {
             name: NOT_CONFIRMED.to_owned(),

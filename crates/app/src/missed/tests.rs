@@ -125,6 +125,8 @@ fn tracks_that_are_seen_or_not_confirmed_are_causes_of_their_own() {
     let notes = FrameNotes { dropped: vec![dropped("body below", AT)], ..FrameNotes::default() };
     let seen = cause(&notes, &[track(3, TrackStage::Seen, 130.0)], None);
     assert_eq!((seen.name.as_str(), seen.test), ("beside the person", None));
+    assert!(seen.text.starts_with("Track 3 is seen here, but too far"), "{}", seen.text);
+    assert!(seen.why.starts_with("a track is seen here"), "the same for all tracks: {}", seen.why);
     let new = cause(&notes, &[track(5, TrackStage::Tentative, 102.0)], None);
     assert_eq!(new.name, NOT_CONFIRMED);
     assert!(new.text.contains("{ tentative_misses = 2 }"), "{}", new.text);
@@ -216,7 +218,7 @@ fn course(tracks: &[SightedTrack], stamp_ns: i64) -> Vec<Missed> {
     let mut witness = Witness::default();
     witness.add(2, &FrameNotes::default(), tracks.to_vec(), None);
     let rules = Rules { remedies: &remedies(), config: &config() };
-    causes(&sequence, &prepared, &matches, &witness, rules)
+    find_missed(&sequence, &prepared, &matches, &witness, rules)
 }
 
 #[test]

@@ -91,12 +91,10 @@ pub struct Witness {
 }
 
 impl Witness {
-    /// Adds the report of a pipeline on a frame.
-    pub fn take(&mut self, item: &LogFrame, report: &FrameReport) {
-        let frame = &item.frame;
-        let notes = FrameNotes::of(report, &frame.camera, &item.odom_from_robot);
+    /// Adds the report of a pipeline on a frame, whose depth image is reduced once for all pipelines.
+    pub fn take(&mut self, item: &LogFrame, report: &FrameReport, depths: Option<Depths>) {
+        let notes = FrameNotes::of(report, &item.frame.camera, &item.odom_from_robot);
         let tracks = report.tracks.iter().map(|track| SightedTrack::of(track, item)).collect();
-        let depths = frame.depth().ok().map(|depth| Depths::of(depth, &frame.camera));
         self.add(report.index, &notes, tracks, depths);
     }
 

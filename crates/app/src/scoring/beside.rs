@@ -81,7 +81,7 @@ mod tests {
             assert_eq!(log_of(&format!("walk.{ending}")), Some("walk"));
             assert!(files_of(&log).contains(&path.display().to_string()), "{ending}");
         }
-        // What is annotated takes the place of all others.
+        // The annotated file takes the place of all others.
         assert_eq!(file_beside(&log), Some((annotated_file(&log), false)));
         assert_eq!([log_of("gt.txt"), log_of("people.csv")], [None; 2]);
     }

@@ -241,7 +241,9 @@ impl Shift<'_> {
                 return Ok(());
             }
             shots.push(Shot::of(&item));
-            lanes.iter_mut().for_each(|lane| lane.step(&item));
+            for lane in &mut lanes {
+                lane.step(&item);
+            }
         }
         let data_lost = source.data_lost();
         for (run, lane) in pass.iter().zip(lanes) {

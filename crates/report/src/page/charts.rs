@@ -19,7 +19,7 @@ impl Page<'_> {
             p {
                 "People missed against false reports, as the least score that is accepted falls. Lower is better. "
                 "LAMR is the geometric mean of the curve at nine places in the shaded band."
-                "A pipeline with fewer than " (FEW_SCORES) " different scores on a log has no line there."
+                " A pipeline with fewer than " (FEW_SCORES) " different scores on a log has no line there."
                 (self.of_the_best())
             }
             p class="legend" {

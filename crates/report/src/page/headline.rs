@@ -19,7 +19,7 @@ impl Page<'_> {
         html! {
             @if let Some(verdict) = self.verdict() { p class="verdict" { (verdict) } }
             @if shown.is_empty() { p { "No task has been compared with a truth, so there are no figures." } }
-            @for note in self.view.notes { p class="bad" { "Note: " (note.trim_end_matches('?')) (if note.ends_with('?') { "?" } else { "." }) } }
+            @for note in self.view.notes { p class="bad" { "Note: " (note) @if !note.ends_with('?') { "." } } }
             @for logs in self.view.copies { p class="bad" { (copies_note(logs)) "." } }
             @if skipped > 0 {
                 p {
@@ -135,10 +135,7 @@ impl Page<'_> {
         cell(
             estimate.mean,
             &html! {
-                span class=(if estimate.best { "value best" } else { "value" }) {
-                    @if estimate.best { "★ " } (number(estimate.mean, figure.decimals))
-                    @if estimate.best { span class="unseen" { " best" } }
-                }
+                (starred(estimate.mean, figure.decimals, estimate.best))
                 @if let Some(ends) = shown_interval(estimate).filter(|ends| informs(ends, figure.range)) {
                     " " (labelled_ends(ends, figure.decimals))
                 }
@@ -185,14 +182,16 @@ fn log_cell(value: Option<f64>, best: f64, columns: usize) -> Markup {
     let Some(value) = value else { return no_cell() };
     // A single column has no best one, and a pipeline without a match is the best in nothing.
     let best = columns > 1 && value > 0.0 && !MAIN.better_as_printed(best, value);
-    cell(
-        value,
-        &html! {
-            span class=(if best { "value best" } else { "value" }) {
-                @if best { "★ " } (number(value, 3)) @if best { span class="unseen" { " best" } }
-            }
-        },
-    )
+    cell(value, &starred(value, MAIN.decimals, best))
+}
+
+/// Renders a value, with a star if it is the best one.
+fn starred(value: f64, decimals: usize, is_best: bool) -> Markup {
+    html! {
+        span class=(if is_best { "value best" } else { "value" }) {
+            @if is_best { "★ " } (number(value, decimals)) @if is_best { span class="unseen" { " best" } }
+        }
+    }
 }
 
 fn figure_head(figure: &Figure) -> Markup {

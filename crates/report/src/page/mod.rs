@@ -14,7 +14,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use tagalong_math::counted;
 
 use crate::chart::minus;
-use crate::model::{Benchmark, Moment, Outcome, Timings};
+use crate::model::{Benchmark, Moment, Timings};
 use crate::summary::{PipelineSummary, Summary};
 use crate::view::OrderedBenchmark;
 
@@ -153,12 +153,10 @@ impl Page<'_> {
         let mut done = 0;
         let mut failed = 0;
         let mut skipped = 0;
-        for task in &self.view.tasks {
-            match task.outcome {
-                Outcome::Done => done += 1,
-                Outcome::Failed { .. } => failed += 1,
-                Outcome::Skipped { .. } => skipped += 1,
-            }
+        for pipeline in &self.summary.pipelines {
+            done += pipeline.done;
+            failed += pipeline.failed;
+            skipped += pipeline.skipped;
         }
         html! {
             (counted(self.view.pipelines.len(), "pipeline")) " on "

@@ -6,7 +6,7 @@ use tagalong_math::counted;
 use super::headline::span_of;
 use super::{MOST_UNFOLDED, Page, cell, column, no_cell, number, optional_cell, table};
 use crate::chart::key;
-use crate::figures::{ComparisonSpace, FEW_SCORES, lamr_of_enough_scores};
+use crate::figures::{ComparisonSpace, FEW_SCORES, has_few_scores, lamr_of_enough_scores};
 use crate::model::{Outcome, TaskResult};
 
 /// Name of an outcome that is a fault, not a choice.
@@ -55,8 +55,7 @@ impl Page<'_> {
             .iter()
             .copied()
             .filter(|task| {
-                let scores = task.image.filter(|scores| scores.reports > 1);
-                scores.is_some_and(|scores| (1..FEW_SCORES).contains(&scores.distinct_scores))
+                task.image.is_some_and(|scores| scores.reports > 1 && has_few_scores(&scores))
             })
             .collect();
         (!constant.is_empty()).then(|| html! {

@@ -337,7 +337,7 @@ mod tests {
             crowd: None,
             approach: Some(ApproachState { gap_m, bearing_rad: -1.6, speed_mps: 1.0 }),
             reason: Some(Reason::Follow),
-            is_still: false,
+            effect: "drives",
         });
         Ride {
             seed: 1,

@@ -162,7 +162,7 @@ mod tests {
                 crowd: None,
                 approach: None,
                 reason: None,
-                is_still: false,
+                effect: "stands",
             };
             change(at_s, &mut tick, &mut view);
             tick.crowd = Some(view);

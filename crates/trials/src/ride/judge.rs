@@ -300,12 +300,16 @@ fn place(moment: &Moment) -> Option<Point2<f64>> {
 
 /// Speed over ground around a frame, m/s.
 fn speed(places: &[Option<Point2<f64>>], seconds: &[f64], at: usize) -> Option<f64> {
-    let apart_s: Vec<f64> = seconds.iter().map(|other| (other - seconds[at]).abs()).collect();
-    let first = (0..=at).rev().take_while(|other| apart_s[*other] <= 0.5 * SPEED_S).last()?;
-    let last = (at..seconds.len()).take_while(|other| apart_s[*other] <= 0.5 * SPEED_S).last()?;
+    let first = (0..=at).rev().take_while(|other| is_near(seconds, at, *other)).last()?;
+    let last = (at..seconds.len()).take_while(|other| is_near(seconds, at, *other)).last()?;
     let way: Vector2<f64> = places[last]? - places[first]?;
     let time_s = seconds[last] - seconds[first];
     (time_s > 0.0).then(|| way.norm() / time_s)
+}
+
+/// Whether the speed around a frame is measured over another one.
+fn is_near(seconds: &[f64], at: usize, other: usize) -> bool {
+    (seconds[other] - seconds[at]).abs() <= 0.5 * SPEED_S
 }
 
 /// The time of some of the frames, s.
@@ -366,9 +370,7 @@ fn reasons(ticks: &[Tick]) -> Vec<ReasonShare> {
     let mut counts: BTreeMap<(&'static str, &'static str), usize> = BTreeMap::new();
     for tick in ticks {
         let name = tick.reason.map_or("no command", Reason::name);
-        // A robot that is slowed down to zero stands.
-        let effect = tick.reason.filter(|_| !tick.is_still).map_or("stands", Reason::effect);
-        *counts.entry((name, effect)).or_default() += 1;
+        *counts.entry((name, tick.effect)).or_default() += 1;
     }
     let mut shares = Vec::new();
     for ((reason, effect), count) in counts {
@@ -465,15 +467,15 @@ mod tests {
             clearance,
             approach: None,
             reason,
-            is_still: false,
+            effect: reason.map_or("stands", Reason::effect),
             crowd: None,
         }
     }
 
     #[test]
     fn a_robot_that_is_slowed_down_to_zero_stands() {
-        let ticks = [(0.2, false), (0.0, true), (0.0, true), (0.0, true)]
-            .map(|(mps, is_still)| Tick { is_still, ..tick(mps, 0.0, Some(Reason::Near)) });
+        let ticks = [(0.2, "slower"), (0.0, "stands"), (0.0, "stands"), (0.0, "stands")]
+            .map(|(mps, effect)| Tick { effect, ..tick(mps, 0.0, Some(Reason::Near)) });
         let shares: Vec<_> =
             reasons(&ticks).iter().map(|it| (it.reason, it.effect, it.share)).collect();
         assert_eq!(shares, [("near", "stands", 0.75), ("near", "slower", 0.25)]);

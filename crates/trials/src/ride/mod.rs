@@ -75,8 +75,8 @@ pub struct Tick {
     pub approach: Option<ApproachState>,
     /// Reason of the command in force; `None` while the enable lets nothing move.
     pub reason: Option<Reason>,
-    /// True where that command neither drives nor turns.
-    pub is_still: bool,
+    /// Effect of that command, as [`Command::effect`]; without one the robot stands.
+    pub effect: &'static str,
 }
 
 impl Tick {
@@ -333,7 +333,7 @@ fn tick(simulation: &Simulation, at_ns: u64, command: Option<Command>) -> Tick {
         crowd: simulation.crowd_view(),
         approach: simulation.approach(ROBOT_RADIUS_M),
         reason: command.map(|command| command.reason),
-        is_still: command.is_none_or(|command| command.effect() == "stands"),
+        effect: command.map_or("stands", |command| command.effect()),
     }
 }
 

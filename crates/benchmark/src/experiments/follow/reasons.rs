@@ -53,13 +53,15 @@ pub fn lines(results: &[Followed]) -> Vec<String> {
 
 impl Sums {
     fn told(&self) -> String {
-        let parts: Vec<String> =
-            ["stands", "slower"].iter().filter_map(|effect| self.of(effect)).collect();
+        let parts: Vec<String> = [("stands", "does not drive"), ("slower", "slower")]
+            .iter()
+            .filter_map(|(effect, words)| self.of(effect, words))
+            .collect();
         if parts.is_empty() { "drove as asked".to_owned() } else { parts.join("; ") }
     }
 
-    /// Returns the reasons of one effect, the commonest first; `None` if there were none.
-    fn of(&self, effect: &str) -> Option<String> {
+    /// Returns the reasons of one effect in these words, the commonest first; `None` if there were none.
+    fn of(&self, effect: &str, words: &str) -> Option<String> {
         let own = self.shares.iter().filter(|((of, _), _)| *of == effect);
         let mut shares: Vec<(&str, f64)> =
             own.map(|((_, reason), sum)| (*reason, sum / self.rides as f64)).collect();
@@ -67,8 +69,7 @@ impl Sums {
         let all: f64 = shares.iter().map(|(_, share)| share).sum();
         let each: Vec<String> =
             shares.iter().map(|(reason, share)| format!("{reason} {}", percent(*share))).collect();
-        let effect = if effect == "stands" { "does not drive" } else { effect };
-        (!each.is_empty()).then(|| format!("{effect} {} ({})", percent(all), each.join(", ")))
+        (!each.is_empty()).then(|| format!("{words} {} ({})", percent(all), each.join(", ")))
     }
 }
 

@@ -185,7 +185,7 @@ mod tests {
                 crowd: None,
                 approach: None,
                 reason: None,
-                is_still: false,
+                effect: "stands",
             }],
             in_view: Vec::new(),
             faults: scene.scheduled_faults(),
