@@ -124,13 +124,18 @@ fn make_report(folder: &FolderArgs, format: Format, gate: Option<&Gate>) -> Resu
     }
 }
 
+/// Returns the end of a sentence on what was run: the number of results that were there already.
+fn earlier(count: usize) -> String {
+    if count == 0 { String::new() } else { format!("; {count} had results of an earlier run") }
+}
+
 fn verdict(tally: Tally, store: &Store) -> Outcome {
     let Tally { asked, ran, done, failed, lost, signal } = tally;
     if let Some(signal) = signal {
         say(&stopped(done, &counted(asked, "task"), store));
         return Ok(Ended::BySignal(signal));
     }
-    say(&format!("{} run, {} had their results", counted(ran, "task"), asked - ran));
+    say(&format!("{} run{}", counted(ran, "task"), earlier(asked - ran)));
     match (failed, lost) {
         (0, false) => Ok(Ended::Well),
         (0, true) => Ok(Ended::WithLoss),

@@ -39,7 +39,7 @@ pub fn rooms(args: &RoomsArgs, registry: &Registry) -> Outcome {
         return Ok(Ended::BySignal(signal));
     }
     let ran = counted(done.ran, "run");
-    say(&format!("{ran} done, {} had their results", done.asked - done.ran));
+    say(&format!("{ran} done{}", super::earlier(done.asked - done.ran)));
     let report = Report::new(args, &locations, &contestants, &desk)?;
     let json = report.json()?;
     store.put("rooms.json", json.as_bytes())?;

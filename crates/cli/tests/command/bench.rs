@@ -157,7 +157,7 @@ fn one_command_ends_in_a_report_and_a_second_one_computes_nothing() {
     let result = home.path("out/results").join(before_result(&home));
     let written = fs::metadata(&result).unwrap().modified().unwrap();
     let told = ok(home.bench(&["--logs-dir", "logs", "-o", "out"]));
-    assert!(told.contains("0 tasks run, 4 had their results"), "{told}");
+    assert!(told.contains("0 tasks run; 4 had results of an earlier run"), "{told}");
     assert_eq!(fs::metadata(&result).unwrap().modified().unwrap(), written);
     assert!(before == files(&home.path("out")), "the second report differs");
     let printed = home.bench(&["report", "-o", "out", "--format", "json"]);
@@ -181,12 +181,12 @@ fn results_and_times_of_another_task_are_not_taken() {
     assert_eq!(code(&refused), 1, "{}", text(&refused.stdout));
     assert!(text(&refused.stderr).contains("the first is 2"), "{}", text(&refused.stderr));
     let told = ok(home.bench(&arguments));
-    assert!(told.contains("1 task run, 1 had their results"), "{told}");
+    assert!(told.contains("1 task run; 1 had results of an earlier run"), "{told}");
     assert!(files(&home.path("out"))["report.json"] == before["report.json"], "the report differs");
     // A damaged result is computed again, too.
     fs::write(home.path("out/results").join(format!("{first}.json")), "{").unwrap();
     let told = ok(home.bench(&arguments[..4]));
-    assert!(told.contains("1 task run, 1 had their results"), "{told}");
+    assert!(told.contains("1 task run; 1 had results of an earlier run"), "{told}");
     assert!(files(&home.path("out"))["report.json"] == before["report.json"], "the report differs");
 }
 

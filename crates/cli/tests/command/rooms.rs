@@ -330,5 +330,5 @@ fn a_signal_leaves_whole_files_and_a_second_run_goes_on() {
         assert!(serde_json::from_slice::<Value>(bytes).is_ok());
     }
     let told = text(&home.rooms(&[]).stderr);
-    assert!(told.contains("2 runs done, 2 had their results"), "{told}");
+    assert!(told.contains("2 runs done; 2 had results of an earlier run"), "{told}");
 }
