@@ -16,6 +16,9 @@ Kinds, the first that fits:
   lost at the border   switched after, or in, a frame in which the border cuts the person
   lost at low rate     switched, at images more than 0.4 s apart
   lost                 switched otherwise
+
+Below stand the people who are missed, in people-frames: those whom the border of the image cuts,
+those of whom another person or a thing hides a quarter or more, and the others.
 """
 
 import csv
@@ -35,6 +38,7 @@ class Person:
         self.box = tuple(float(row[key]) for key in ("ub_x", "ub_y", "ub_w", "ub_h"))
         self.occluder = row.get("occluder", "0")
         self.visible = float(row.get("visible") or 1.0)
+        self.is_ignored = row.get("ignore") == "1"
 
     def is_hidden(self):
         """Returns true if another person hides a quarter of this one or more."""
@@ -154,6 +158,22 @@ def events(truth_path, run):
     return switches, inherited
 
 
+def misses(truth_path, run):
+    """Returns the number of people-frames, and of those missed: cut by the border, hidden, others."""
+    truth = read_truth(truth_path)
+    tracks = read_tracks(Path(run) / "tracks.csv")
+    people, missed = 0, [0, 0, 0]
+    for frame, annotated in truth.items():
+        found = {person for person, _ in matches(annotated, tracks.get(frame, []))}
+        for person in annotated:
+            people += not person.is_ignored
+            if person.is_ignored or person.number in found:
+                continue
+            kind = 0 if person.occluder == "border" else 1 if person.visible < HIDDEN else 2
+            missed[kind] += 1
+    return people, missed
+
+
 def main():
     arguments = sys.argv[1:]
     if len(arguments) < 2:
@@ -171,7 +191,12 @@ def main():
             counts[kind] += len(listed)
         for frame, event, kind in sorted(found[0] + found[1]):
             print(f"| {log} | {frame} | {event} | {kind} |")
-    print(f"\n{counts[0]} switches, {counts[1]} inherited IDs")
+    print(f"\n{counts[0]} switches, {counts[1]} inherited IDs\n")
+    print("| log | people-frames | missed | cut by the border | hidden | others |")
+    print("|---" * 6 + "|")
+    for log, truth, run in runs:
+        people, missed = misses(truth, run)
+        print(f"| {log} | {people} | {sum(missed)} | {missed[0]} | {missed[1]} | {missed[2]} |")
 
 
 if __name__ == "__main__":

@@ -1,10 +1,11 @@
 //! People by their legs in a laser scan: two logs of the leg tracker benchmark with annotated
 //! people, beside its published figures.
 
-use std::collections::BTreeMap;
-use std::path::Path;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3};
+use tagalong_core::{Frame, Inputs, LaserScan, spatial_pose};
 use tagalong_eval::formats::floor::{self, Row as TruthRow};
 use tagalong_eval::{FloorClear, FloorPoint, FloorScan, FloorTally};
 use tagalong_log::{FrameSource, InputSettings, Limits};
@@ -28,6 +29,11 @@ pub const SYSTEM: System = System {
             name: "following",
             about: "Table III: a robot that follows one person outdoors",
             run: following,
+        },
+        Experiment {
+            name: "at-once",
+            about: "the log of the robot that drives, with and without the times of the rays",
+            run: at_once,
         },
     ],
 };
@@ -56,6 +62,28 @@ const COLUMNS: [&str; 9] = [
     "MOTP, m",
     "estimates a scan",
 ];
+
+/// Columns of the table with and without the times of the rays.
+const SWEEP_COLUMNS: [&str; 9] = [
+    "objects",
+    "found",
+    "false positives",
+    "precision, %",
+    "recall, %",
+    "switches",
+    "IDs",
+    "MOTA, %",
+    "MOTP, m",
+];
+
+/// Use of the times of single rays.
+#[derive(Clone, Copy, PartialEq)]
+enum Rays {
+    /// Each point moves with the robot since the time of its own ray, as the log reader has it.
+    Timed,
+    /// All points count as measured at the stamp of the scan.
+    AtOnce,
+}
 
 /// Log with the scan rate and the part of the scan that counts.
 struct Log {
@@ -87,17 +115,34 @@ struct Tracked {
     clear: FloorClear,
     /// Number of the first scan with an estimate of an annotated person.
     first: Option<u32>,
+    /// Number of IDs among the estimates.
+    ids: usize,
 }
 
-/// Time of coasting, counts, and number of the first scan with an estimate of an annotated person.
-type Counted = (f64, FloorClear, Option<u32>);
+/// Counts of a run for one time of coasting.
+struct Counting {
+    coasting_s: f64,
+    tally: FloorTally,
+    first: Option<u32>,
+    ids: BTreeSet<i64>,
+}
+
+/// Distances by which the motion of the robot during a scan moves its points, m.
+#[derive(Default)]
+struct Moved {
+    scans: u32,
+    moved_scans: u32,
+    points: u64,
+    sum_m: f64,
+    most_m: f64,
+}
 
 fn moving(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
     fn given(of: [f64; 8]) -> [Option<f64>; 8] {
         of.map(Some)
     }
 
-    let tracked = MOVING.track_all(lab)?;
+    let tracked = MOVING.track_all(lab, Rays::Timed)?;
     if tracked.is_empty() {
         return Ok(MOVING.without_data().into());
     }
@@ -136,7 +181,7 @@ fn following(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
         [objects, valid, switches, misses, None, None, recall, motp]
     }
 
-    let tracked = FOLLOWING.track_all(lab)?;
+    let tracked = FOLLOWING.track_all(lab, Rays::Timed)?;
     if tracked.is_empty() {
         return Ok(FOLLOWING.without_data().into());
     }
@@ -167,6 +212,33 @@ fn following(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
             .into(),
     ]);
     Ok(table.into())
+}
+
+fn at_once(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
+    let timed = MOVING.track_all(lab, Rays::Timed)?;
+    if timed.is_empty() {
+        return Ok(MOVING.without_data().into());
+    }
+    let at_once = MOVING.track_all(lab, Rays::AtOnce)?;
+    let mut rows = Vec::new();
+    for (timed, at_once) in timed.iter().zip(&at_once) {
+        rows.push(timed.sweep_row("de-skewed"));
+        rows.push(at_once.sweep_row("as if measured at once"));
+    }
+    Ok(Table {
+        title: "Scans de-skewed by the odometry, or taken as measured at once (laser-moving, strict, \
+                0.75 m)"
+            .into(),
+        columns: SWEEP_COLUMNS.map(String::from).to_vec(),
+        rows,
+        notes: vec![
+            MOVING.moved(lab)?.sentence(),
+            "The people were annotated in scans that are not de-skewed. IDs: those of all estimates \
+             that count."
+                .into(),
+        ],
+    }
+    .into())
 }
 
 /// Published figures (ICRA 2015, Table III) of both moving bags together.
@@ -203,25 +275,32 @@ fn published(name: &str, figures: Figures) -> Row {
 
 impl Log {
     /// Runs all configs; nothing without the log.
-    fn track_all(&self, lab: &Lab<'_>) -> Result<Vec<Tracked>, ReproduceError> {
-        let Some(folder) = lab.data.as_ref().map(|data| data.join("laser")) else {
-            return Ok(Vec::new());
-        };
-        let log = folder.join(format!("{}.mcap", self.name));
-        if !log.is_file() {
-            return Ok(Vec::new());
-        }
-        let truth = truth(&folder.join(format!("{}.people-floor.csv", self.name)))?;
+    fn track_all(&self, lab: &Lab<'_>, rays: Rays) -> Result<Vec<Tracked>, ReproduceError> {
+        let Some(log) = self.path(lab) else { return Ok(Vec::new()) };
+        let truth = truth(&log.with_extension("people-floor.csv"))?;
         lab.progress.begin(CONFIGS.len(), self.name);
         let mut all = Vec::new();
         for (config, chosen_on) in CONFIGS {
-            for (coasting_s, clear, first) in self.track(lab, &log, &truth, config)? {
-                let is_chosen_here = chosen_on == self.name;
-                all.push(Tracked { config, is_chosen_here, coasting_s, clear, first });
+            for counted in self.track(lab, &log, &truth, config, rays)? {
+                let Counting { coasting_s, tally, first, ids } = counted;
+                all.push(Tracked {
+                    config,
+                    is_chosen_here: chosen_on == self.name,
+                    coasting_s,
+                    clear: tally.finish(),
+                    first,
+                    ids: ids.len(),
+                });
             }
             lab.progress.step();
         }
         Ok(all)
+    }
+
+    /// Returns the file of the log; `None` without it.
+    fn path(&self, lab: &Lab<'_>) -> Option<PathBuf> {
+        let log = lab.data.as_ref()?.join("laser").join(format!("{}.mcap", self.name));
+        log.is_file().then_some(log)
     }
 
     /// Runs one config, and counts its estimates for each time of coasting.
@@ -231,29 +310,47 @@ impl Log {
         log: &Path,
         truth: &BTreeMap<u32, Vec<TruthRow>>,
         config: &str,
-    ) -> Result<[Counted; COASTING_S.len()], ReproduceError> {
+        rays: Rays,
+    ) -> Result<[Counting; COASTING_S.len()], ReproduceError> {
         let mut pipeline = lab.contender(config)?.pipeline(lab.registry, 1)?;
-        let input = InputSettings::default();
-        let limits = Limits::default();
-        let mut source = FrameSource::open(log, &input, &limits, pipeline.inputs())
-            .map_err(|error| ReproduceError::of(self.name, error))?;
-        let mut tallies = COASTING_S.map(|coasting_s| (coasting_s, FloorTally::new(CUT_M), None));
+        let mut source = self.open(log, pipeline.inputs())?;
+        let mut all = COASTING_S.map(Counting::new);
         let mut number = 0;
         while let Some(item) = source.next_frame() {
+            let frame = match rays {
+                Rays::Timed => item.frame,
+                Rays::AtOnce => without_times(item.frame),
+            };
             let report =
-                pipeline.step(&item.frame).map_err(|error| ReproduceError::of(self.name, error))?;
-            let scan = item.frame.scan().map_err(|error| ReproduceError::of(self.name, error))?;
+                pipeline.step(&frame).map_err(|error| ReproduceError::of(self.name, error))?;
+            let scan = frame.scan().map_err(|error| ReproduceError::of(self.name, error))?;
             let people = truth.get(&number).map_or(&[][..], Vec::as_slice);
-            for (coasting_s, tally, first) in &mut tallies {
-                let scan = self.scan(people, &report, &scan.robot_from_scanner, *coasting_s);
-                tally.add(&scan);
-                if first.is_none() && has_match(&scan) {
-                    *first = Some(number);
-                }
+            for counting in &mut all {
+                let coasting_s = counting.coasting_s;
+                let scan = self.scan(people, &report, &scan.robot_from_scanner, coasting_s);
+                counting.add(&scan, number);
             }
             number += 1;
         }
-        Ok(tallies.map(|(coasting_s, tally, first)| (coasting_s, tally.finish(), first)))
+        Ok(all)
+    }
+
+    fn open(&self, log: &Path, inputs: Inputs) -> Result<FrameSource, ReproduceError> {
+        let source =
+            FrameSource::open(log, &InputSettings::default(), &Limits::default(), inputs);
+        source.map_err(|error| ReproduceError::of(self.name, error))
+    }
+
+    /// Returns the distances by which the motion of the robot during a scan moves its points.
+    fn moved(&self, lab: &Lab<'_>) -> Result<Moved, ReproduceError> {
+        let mut moved = Moved::default();
+        let Some(log) = self.path(lab) else { return Ok(moved) };
+        let mut source = self.open(&log, Inputs::ANY)?;
+        while let Some(item) = source.next_frame() {
+            let scan = item.frame.scan().map_err(|error| ReproduceError::of(self.name, error))?;
+            moved.add(scan);
+        }
+        Ok(moved)
     }
 
     /// Returns the people and the estimates of a scan that count, in the frame of the laser.
@@ -285,10 +382,7 @@ impl Log {
             floors.iter().map(|(name, of)| Row::ours(format!("floor: {name}"), cells(*of)));
         let ours = tracked.iter().map(|tracked| {
             let chosen = if tracked.is_chosen_here { ", chosen on this log" } else { "" };
-            let coasting = match tracked.coasting_s {
-                0.0 => String::new(),
-                seconds => format!(", coasting for {seconds} s"),
-            };
+            let coasting = tracked.coasting();
             Row::ours(format!("`{}`{coasting}{chosen}", tracked.config), self.cells(&tracked.clear))
         });
         let clusters = if self.is_complete { "people" } else { "blocks of 45 scans" };
@@ -364,6 +458,97 @@ impl Log {
     }
 }
 
+impl Counting {
+    fn new(coasting_s: f64) -> Self {
+        Self { coasting_s, tally: FloorTally::new(CUT_M), first: None, ids: BTreeSet::new() }
+    }
+
+    fn add(&mut self, scan: &FloorScan, number: u32) {
+        self.tally.add(scan);
+        self.ids.extend(scan.estimates.iter().map(|estimate| estimate.id));
+        if self.first.is_none() && has_match(scan) {
+            self.first = Some(number);
+        }
+    }
+}
+
+impl Tracked {
+    /// Returns the row of the table with and without the times of the rays.
+    fn sweep_row(&self, scans: &str) -> Row {
+        let clear = &self.clear;
+        let found = clear.valid + clear.switches;
+        let has_any = clear.estimates > 0;
+        let precision = has_any.then(|| found as f64 / clear.estimates as f64);
+        let mota = clear.mota().map_or_else(Cell::default, |mota| Cell::number(100.0 * mota, 1));
+        Row::ours(
+            format!("`{}`{}: {scans}", self.config, self.coasting()),
+            vec![
+                Cell::number(clear.objects as f64, 0),
+                Cell::number(found as f64, 0),
+                Cell::number(clear.false_positives as f64, 0),
+                precision.map_or_else(Cell::default, |share| Cell::number(100.0 * share, 1)),
+                Cell::estimate(clear.recall(BLOCK), 3).percent(),
+                Cell::number(clear.switches as f64, 0),
+                Cell::number(self.ids as f64, 0),
+                mota,
+                clear.motp_m().map_or_else(Cell::default, |motp| Cell::number(motp, 3)),
+            ],
+        )
+    }
+
+    fn coasting(&self) -> String {
+        match self.coasting_s {
+            0.0 => String::new(),
+            seconds => format!(", coasting for {seconds} s"),
+        }
+    }
+}
+
+impl Moved {
+    fn add(&mut self, scan: &LaserScan) {
+        let skewed = points_at_once(scan);
+        self.scans += 1;
+        self.moved_scans += u32::from(scan.motion.is_some());
+        for (moved, skewed) in scan.points.iter().zip(&skewed) {
+            let by_m = (moved - skewed).norm();
+            self.points += 1;
+            self.sum_m += by_m;
+            self.most_m = self.most_m.max(by_m);
+        }
+    }
+
+    fn sentence(&self) -> String {
+        format!(
+            "{} of {} scans are de-skewed, the others are of a robot that stands: points move by \
+             {:.3} m on average, and by {:.3} m at most.",
+            self.moved_scans,
+            self.scans,
+            self.sum_m / self.points.max(1) as f64,
+            self.most_m
+        )
+    }
+}
+
+/// Returns the frame as it is without the times of single rays.
+fn without_times(frame: Frame) -> Frame {
+    let Some(scan) = frame.laser() else { return frame };
+    let mut at_once = scan.clone();
+    at_once.points = points_at_once(scan).into();
+    at_once.motion = None;
+    frame.with_sensor(at_once)
+}
+
+/// Returns the points of a scan as if the robot stood where it was at ray 0.
+fn points_at_once(scan: &LaserScan) -> Vec<Point3<f64>> {
+    let Some(motion) = scan.motion else { return scan.points.to_vec() };
+    let mut points = Vec::new();
+    for (ray, point) in scan.rays.iter().zip(scan.points.iter()) {
+        let back = motion.first * motion.robot_at(*ray).inverse();
+        points.push(spatial_pose(&back) * point);
+    }
+    points
+}
+
 /// Returns the annotated people by scan.
 fn truth(path: &Path) -> Result<BTreeMap<u32, Vec<TruthRow>>, ReproduceError> {
     let rows = floor::parse(&read(path)?, &path.display().to_string());
@@ -399,4 +584,35 @@ fn has_match(scan: &FloorScan) -> bool {
     }
 
     scan.people.iter().any(|person| scan.estimates.iter().any(|one| apart(person, one)))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::FRAC_PI_2;
+
+    use nalgebra::{Isometry2, Vector2};
+    use tagalong_core::SweepMotion;
+
+    use super::*;
+
+    /// A robot turns to the left by a right angle and drives 0.4 m while its scanner has five rays: two
+    /// points as it saw them from where it was at rays 0 and 4, 2 m ahead both.
+    #[test]
+    fn without_the_times_of_the_rays_all_points_are_where_ray_0_would_have_seen_them() {
+        let first = Isometry2::new(Vector2::new(0.1, 0.0), 0.0);
+        let last = Isometry2::new(Vector2::new(0.5, 0.0), FRAC_PI_2);
+        let points = vec![Point3::new(2.1, 0.0, 0.3), Point3::new(0.5, 2.0, 0.3)];
+        let scan = LaserScan::of_points(points)
+            .with_rays(0.0, 0.1, vec![0, 4])
+            .with_motion(Some(SweepMotion { first, last, last_ray: 4 }));
+        for point in points_at_once(&scan) {
+            assert!((point - Point3::new(2.1, 0.0, 0.3)).norm() < 1e-12, "{point}");
+        }
+        let mut moved = Moved::default();
+        moved.add(&scan);
+        assert!((moved.most_m - 6.56_f64.sqrt()).abs() < 1e-9, "{}", moved.most_m);
+        assert_eq!([moved.scans, moved.moved_scans], [1, 1]);
+        let still = scan.with_motion(None);
+        assert_eq!(points_at_once(&still), still.points.to_vec());
+    }
 }
