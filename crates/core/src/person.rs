@@ -4,6 +4,8 @@ use tagalong_geometry::Rect;
 /// Standard deviation of a distance, as a share of it, above which the distance is a guess. On recorded logs
 /// it was 6 to 25 % of distances by the size of a box, and 2 to 4 % of most that were measured.
 const GUESSED: f64 = 0.05;
+/// The same in metres, which near people have to exceed as well: labels have one decimal.
+const GUESSED_M: f64 = 0.1;
 
 /// State of a person in the robot frame: what the covariance of an [`Estimate`] is about, no more.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,7 +51,7 @@ impl Estimate {
     }
 
     /// Returns true if the distance along the floor is a guess: its standard deviation is more than a
-    /// twentieth of it, because it comes from the size of a box, or because the person was not seen for
+    /// twentieth of it and more than a decimetre, because it comes from the size of a box, or because the person was not seen for
     /// some time.
     ///
     /// ```
@@ -66,8 +68,9 @@ impl Estimate {
     pub fn is_distance_guessed(&self) -> bool {
         let away = self.person.position.xy().coords;
         let along = (away.transpose() * self.covariance.fixed_view::<2, 2>(0, 0) * away)[0];
-        // Both sides times the squared distance, which may be 0.
-        along > (GUESSED * away.norm_squared()).powi(2)
+        let distance_m = away.norm();
+        // Both sides times the distance, which may be 0.
+        along > (distance_m * f64::max(GUESSED * distance_m, GUESSED_M)).powi(2)
     }
 
     /// Returns the distance along the floor in words for a label, with `~` before one that is a guess.
@@ -111,6 +114,20 @@ mod tests {
             let text = if is_guessed { "~5.0 m" } else { "5.0 m" };
             assert_eq!(estimate.distance_text(), text);
         }
+    }
+
+    /// 0.09 m are 9 % of a metre, and less than a label shows.
+    #[test]
+    fn a_distance_that_is_right_to_the_decimetre_is_no_guess() {
+        let person = Person { position: Point3::new(1.0, 0.0, 1.6), velocity: Vector2::zeros() };
+        for (sigma_m, is_guessed) in [(0.09, false), (0.11, true)] {
+            let covariance = SMatrix::identity() * (sigma_m * sigma_m);
+            let estimate = Estimate::new(person, covariance, Rect::default());
+            assert_eq!(estimate.is_distance_guessed(), is_guessed, "{sigma_m}");
+        }
+        let here = Person { position: Point3::new(0.0, 0.0, 1.6), ..person };
+        let estimate = Estimate::new(here, SMatrix::identity(), Rect::default());
+        assert_eq!(estimate.distance_text(), "0.0 m");
     }
 
     #[test]
