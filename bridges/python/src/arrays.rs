@@ -17,8 +17,6 @@ use crate::errors::wrong;
 
 /// Largest side of an image, pixels, as in logs.
 const MAX_SIDE: usize = 16_384;
-/// Metres per unit of 16-bit depth.
-const MILLIMETRE: f32 = 0.001;
 /// Largest error of a rotation matrix: entries of `R R' - I`.
 const ROTATION_TOLERANCE: f64 = 1e-3;
 
@@ -79,25 +77,31 @@ pub fn depth(array: &Bound<'_, PyAny>) -> PyResult<DepthImage> {
         return Err(wrong(format!("depth has shape {shape:?}; give rows x columns")));
     }
     let (height, width) = sides(&shape, "depth")?;
-    let packed: Vec<f32> = if let Ok(pixels) = array.extract::<PyReadonlyArray2<'_, f32>>() {
-        pixels.as_array().iter().map(|value| of_metres(*value)).collect()
+    let image = if let Ok(pixels) = array.extract::<PyReadonlyArray2<'_, f32>>() {
+        let packed = pixels.as_array().iter().map(|value| of_metres(*value)).collect();
+        DepthImage::from_pixels(width, height, packed)
     } else if let Ok(pixels) = array.extract::<PyReadonlyArray2<'_, u16>>() {
-        pixels.as_array().iter().map(|value| of_millimetres(*value)).collect()
+        let view = pixels.as_array();
+        match view.as_slice() {
+            Some(packed) => DepthImage::from_millimetres(width, height, packed),
+            // A crop or a flipped image is gathered row by row.
+            None => {
+                let packed: Vec<u16> = view.iter().copied().collect();
+                DepthImage::from_millimetres(width, height, &packed)
+            }
+        }
     } else if let Ok(pixels) = array.extract::<PyReadonlyArray2<'_, f64>>() {
-        pixels.as_array().iter().map(|value| of_metres(*value as f32)).collect()
+        let packed = pixels.as_array().iter().map(|value| of_metres(*value as f32)).collect();
+        DepthImage::from_pixels(width, height, packed)
     } else {
         return Err(odd(array, "depth", "float32 (metres) or uint16 (millimetres)"));
     };
-    DepthImage::from_pixels(width, height, packed).ok_or_else(|| wrong("depth has a wrong size"))
+    image.ok_or_else(|| wrong("depth has a wrong size"))
 }
 
 /// Returns a depth in metres; NaN where it is no reading.
 fn of_metres(value: f32) -> f32 {
     if DepthImage::is_reading(value) { value } else { f32::NAN }
-}
-
-fn of_millimetres(value: u16) -> f32 {
-    if value == 0 || value == u16::MAX { f32::NAN } else { f32::from(value) * MILLIMETRE }
 }
 
 fn shape_of(array: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<usize>> {

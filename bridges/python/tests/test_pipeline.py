@@ -169,13 +169,23 @@ def test_other_detectors_find_no_joints(log):
     assert tracks and all(track.joints is None and track.raised_hand is None for track in tracks)
 
 
-def test_depth_in_millimetres_is_depth_in_metres(log):
+def test_depth_in_millimetres_is_depth_in_metres_and_holes_are_holes(log):
+    def millimetres(depth, hole=0):
+        return np.nan_to_num(depth * 1000.0, nan=hole).round().astype(np.uint16)
+
+    frames = tagalong.Pipeline.from_toml("depth-ekf").frames(log)
+    assert all(np.isnan(frame.depth).any() for frame in frames)
     tracks = {}
     for name, depth_of in {
         "metres": lambda depth: depth,
         "double": lambda depth: depth.astype(np.float64),
-        "millimetres": lambda depth: np.nan_to_num(depth * 1000.0).round().astype(np.uint16),
+        "millimetres": millimetres,
+        "largest": lambda depth: millimetres(depth, 65535),
+        "zero": lambda depth: np.nan_to_num(depth, nan=0.0),
+        "negative": lambda depth: np.nan_to_num(depth, nan=-1.0).astype(np.float64),
+        "infinite": lambda depth: np.nan_to_num(depth, nan=np.inf),
         "flipped": lambda depth: np.ascontiguousarray(depth[::-1])[::-1],
+        "flipped millimetres": lambda depth: np.ascontiguousarray(millimetres(depth)[::-1])[::-1],
     }.items():
         pipeline = tagalong.Pipeline.from_toml("depth-ekf")
         tracks[name] = [

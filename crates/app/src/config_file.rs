@@ -117,6 +117,17 @@ impl ConfigFile {
         digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
+    /// Returns true for the built-in config of a name, whatever the file is called, and for one that extends
+    /// it.
+    pub fn is_or_extends(&self, builtin: &str) -> bool {
+        let Ok(shipped) = ConfigSource::builtin(builtin) else { return false };
+        if self.source.text() == shipped.text() {
+            return true;
+        }
+        let Ok(document) = self.source.document() else { return false };
+        document.bases().any(|(_, text)| text == shipped.text())
+    }
+
     /// Returns the files that its settings name, such as models, with the name used there.
     pub fn files(&self) -> Vec<(String, PathBuf)> {
         self.source.files()

@@ -26,6 +26,7 @@ pub mod experiments;
 mod export;
 mod folder;
 mod gate;
+mod made_with;
 mod misses;
 mod moments;
 mod pictures;

@@ -1,6 +1,6 @@
 //! Tasks of a benchmark: pipelines on logs, each with an identifying hash.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -20,6 +20,7 @@ use tagalong_math::counted;
 use tagalong_pipeline::{Suits, Tunable};
 
 use super::args::PlanArgs;
+use super::made_with;
 
 /// Prefix of the inputs that are files named by a config.
 const FILE: &str = "file ";
@@ -56,6 +57,9 @@ pub struct Task {
     /// SHA-256 of the recording that the log is a copy of, if `tagalong alter` made it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub copy_of: Option<String>,
+    /// True if shipped models or settings of the pipeline were made with this recording.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub made_with_log: bool,
     /// Version of the program that planned it.
     pub version: String,
     /// Reason for which it cannot run, if there is one.
@@ -78,6 +82,8 @@ pub struct PlannedConfig {
     pub tune: Vec<Tunable>,
     /// Robots and cameras for which it is made.
     suits: Suits,
+    /// Hashes of the recordings with which its shipped models and settings were made.
+    made_with: BTreeSet<String>,
 }
 
 impl PlannedConfig {
@@ -243,6 +249,7 @@ fn task(
         seed,
         inputs,
         copy_of: log.copy_of.clone(),
+        made_with_log: config.made_with.contains(log.copy_of.as_ref().unwrap_or(&log.sha256)),
         version: version.to_owned(),
         skip: None,
     })
@@ -329,7 +336,9 @@ pub fn candidate(path: &Path, registry: &Registry) -> Result<PlannedConfig, Fail
     let tune = settings.tune;
     let suits = settings.suits;
     let inputs = pipeline.inputs();
-    Ok(PlannedConfig { file, path: path.to_owned(), first_seed, outer, inputs, tune, suits })
+    let made_with = made_with::recordings_of(&file, pipeline.config().values())?;
+    let path = path.to_owned();
+    Ok(PlannedConfig { file, path, first_seed, outer, inputs, tune, suits, made_with })
 }
 
 fn logs(args: &PlanArgs) -> Result<Vec<Annotated>, Failure> {
@@ -425,7 +434,7 @@ fn copy_of(log: &Path) -> Option<String> {
 /// # Errors
 /// The repeated name.
 pub fn unique(what: &str, names: impl Iterator<Item = String>) -> Result<(), Failure> {
-    let mut seen = std::collections::BTreeSet::new();
+    let mut seen = BTreeSet::new();
     for name in names {
         if !seen.insert(name.clone()) {
             return Err(Failure::usage(format!("two {what} are called `{name}`; rename one")));
@@ -458,6 +467,28 @@ fn hash_of_file(path: &Path) -> io::Result<String> {
             0 => return Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()),
             count => hash.update(&buffer[..count]),
         }
+    }
+}
+
+/// Returns a task of a pipeline on some log, for tests.
+#[cfg(test)]
+pub fn planned_for_tests(pipeline: &str) -> Task {
+    Task {
+        k: 1,
+        hash: pipeline.into(),
+        pipeline: pipeline.into(),
+        config: "a.toml".into(),
+        log_name: "hall".into(),
+        log: "logs/hall.mcap".into(),
+        truth: "logs/hall.people.csv".into(),
+        whole_bodies: false,
+        drops_doubled_ids: false,
+        seed: 0,
+        inputs: BTreeMap::new(),
+        copy_of: None,
+        made_with_log: false,
+        version: String::new(),
+        skip: None,
     }
 }
 

@@ -9,10 +9,10 @@ use tagalong_app::scoring::match_note;
 use tagalong_math::counted;
 use tagalong_report::{Benchmark, Outcome, TaskResult, Timings};
 
-use super::moments;
 use super::plan::Task;
 use super::store::{Store, Stored, StoredTiming};
 use super::work::blank;
+use super::{made_with, moments};
 
 /// Gathers the results of a plan.
 ///
@@ -53,7 +53,7 @@ struct Matched {
     reports: u64,
 }
 
-/// Returns the notes on the truth of each log, once each.
+/// Returns the notes on the truth of each log, and on logs with which pipelines were made, once each.
 fn notes(plan: &[Task], all: &[Stored]) -> Vec<String> {
     let mut notes: Vec<String> = Vec::new();
     let mut logs: BTreeMap<&Path, Matched> = BTreeMap::new();
@@ -72,6 +72,8 @@ fn notes(plan: &[Task], all: &[Stored]) -> Vec<String> {
     for (truth, log) in logs {
         notes.extend(match_note(truth, log.people, log.matches, log.reports));
     }
+    let done = plan.iter().zip(all).filter(|(_, stored)| stored.result.outcome == Outcome::Done);
+    notes.extend(made_with::notes(done.map(|(task, _)| task)));
     notes
 }
 
@@ -223,6 +225,7 @@ fn figures(task: &TaskResult) -> String {
 mod tests {
     use tagalong_eval::Scores;
 
+    use super::super::plan::planned_for_tests;
     use super::*;
 
     fn task(pipeline: &str, log: &str) -> TaskResult {
@@ -248,7 +251,7 @@ mod tests {
 
     #[test]
     fn nothing_that_matches_on_a_log_is_asked_about_once_for_all_pipelines() {
-        let plan: Vec<Task> = ["a", "b"].iter().map(|name| planned(name)).collect();
+        let plan: Vec<Task> = ["a", "b"].map(planned_for_tests).to_vec();
         let asked = "hall.people.csv: nothing matches: is it the truth of another log?";
         assert_eq!(notes(&plan, &[0, 0].map(stored)), ["hall.people.csv: odd", asked]);
         // A pipeline may be bad, where another one finds the people.
@@ -260,24 +263,5 @@ mod tests {
         let scores = Scores { truths: 30, reports: 20, tp, ..Scores::default() };
         let result = TaskResult { image: Some(scores), ..task("a", "hall") };
         Stored { result, notes: vec!["hall.people.csv: odd".into()], ..Stored::default() }
-    }
-
-    fn planned(pipeline: &str) -> Task {
-        Task {
-            k: 1,
-            hash: pipeline.into(),
-            pipeline: pipeline.into(),
-            config: "a.toml".into(),
-            log_name: "hall".into(),
-            log: "logs/hall.mcap".into(),
-            truth: "logs/hall.people.csv".into(),
-            whole_bodies: false,
-            drops_doubled_ids: false,
-            seed: 0,
-            inputs: BTreeMap::new(),
-            copy_of: None,
-            version: String::new(),
-            skip: None,
-        }
     }
 }

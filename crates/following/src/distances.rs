@@ -31,6 +31,13 @@ pub struct SafetyDistances {
     pub slowdown_polygon_m: Option<f64>,
     /// Factor of the speed while something is inside the slowdown polygon.
     pub slowdown_ratio: f64,
+    /// Time after the last image for which its command holds, s: then zero is commanded.
+    pub holds_s: f64,
+    /// Time after the last image until the robot stands, for a base that brakes from full speed as the
+    /// command limiter does, s.
+    pub stands_after_s: f64,
+    /// Way in that time, m.
+    pub stands_after_m: f64,
 }
 
 impl SafetyDistances {
@@ -40,10 +47,12 @@ impl SafetyDistances {
         let speed_mps = robot.max_speed_mps;
         let stopping_m = command_limiter.stopping_m(speed_mps) - command_limiter.margin_m;
         let least_s = command_limiter.reaction_s + command_limiter.settle_s;
-        let stopping_s = least_s + speed_mps / command_limiter.max_decel_mps2;
+        let braking_s = speed_mps / command_limiter.max_decel_mps2;
+        let stopping_s = least_s + braking_s;
         let [comes_m, least_comes_m] = [stopping_s, least_s]
             .map(|time_s| reach_m(collision_monitor, collision_monitor.people_mps, time_s));
         let protective_m = collision_monitor.protective_m;
+        let holds_s = command_limiter.valid_s;
         Self {
             speed_mps,
             stopping_m,
@@ -55,6 +64,9 @@ impl SafetyDistances {
             stop_polygon_m: foremost_m(&collision_monitor.stop),
             slowdown_polygon_m: foremost_m(&collision_monitor.slowdown),
             slowdown_ratio: collision_monitor.slowdown_ratio,
+            holds_s,
+            stands_after_s: holds_s + braking_s,
+            stands_after_m: speed_mps * (holds_s + 0.5 * braking_s),
         }
     }
 }
@@ -112,6 +124,10 @@ mod tests {
         assert!((found.least_separation_m - 1.4).abs() < 1e-9);
         assert!(found.stopping_m < found.before_things_m);
         assert!((found.turning_radius_m - 0.25_f64.hypot(0.1)).abs() < 1e-12);
+        // A quarter of a second at 0.9 m/s, and 0.9 s of braking by 1 m/s².
+        assert_eq!(found.holds_s, 0.25);
+        assert!((found.stands_after_s - 1.15).abs() < 1e-9);
+        assert!((found.stands_after_m - (0.9 * 0.25 + 0.405)).abs() < 1e-9);
     }
 
     #[test]

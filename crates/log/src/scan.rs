@@ -150,6 +150,10 @@ impl Scan {
     /// Reads the whole log once; a file a second time if there were messages of channels that became
     /// known only later.
     ///
+    /// Chunks are unpacked here and again for the frames: stamps, frames and sizes stand in the messages, of
+    /// which the index of a file has the time of recording alone, a transform may come late, and damage and
+    /// the hash concern every byte. What is unpacked is not kept, because a log may be larger than the memory.
+    ///
     /// # Errors
     /// A file that cannot be opened or is not MCAP.
     pub(crate) fn read(

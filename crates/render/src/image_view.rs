@@ -260,6 +260,5 @@ fn name_of(track: &Track, is_target: bool) -> String {
         (true, true) => "",
         (true, false) => " predicted",
     };
-    let distance = track.estimate.person.position.xy().coords.norm();
-    format!("{}{target}{state} {distance:.1} m", track.id)
+    format!("{}{target}{state} {}", track.id, track.estimate.distance_text())
 }

@@ -141,10 +141,11 @@ fn the_labels_of_two_people_side_by_side_do_not_overlap() {
         (region.x, region.y) = (x, y);
     }
     scene.report.tracks[1].seen = false;
+    scene.report.tracks[2].estimate.covariance *= 100.0;
     let labels = image_view::placed_labels(&scene, DEBUG);
     let bars = labels.bars();
     let texts: Vec<&str> = bars.iter().map(|(_, text)| *text).collect();
-    assert_eq!(texts, ["1 3.0 m", "2 predicted 3.0 m", "3 3.0 m", "head width"]);
+    assert_eq!(texts, ["1 3.0 m", "2 predicted 3.0 m", "3 ~3.0 m", "head width"]);
     for (i, (bar, text)) in bars.iter().enumerate() {
         assert!(bar.height >= 16.0, "{text}");
         assert_eq!(bar.clipped(640, 480), *bar, "{text} leaves the image");

@@ -121,6 +121,9 @@ fn told(distances: &SafetyDistances) -> String {
         stop_polygon_m,
         slowdown_polygon_m,
         slowdown_ratio,
+        holds_s,
+        stands_after_s,
+        stands_after_m,
     } = distances;
     let mut lines = format!(
         "  distances from the edge of the footprint (see docs/safety.md):\n  \
@@ -130,7 +133,9 @@ fn told(distances: &SafetyDistances) -> String {
          slower where they are nearer, and stands below {least_separation_m:.2} m\n  \
          it stops {followed_m:.2} m before the followed person\n  \
          when it turns, its corners sweep a circle with a radius of {turning_radius_m:.2} m around \
-         the middle of the robot\n"
+         the middle of the robot\n  \
+         after the last image its command holds for {holds_s:.2} s, then zero is commanded, and the robot \
+         stands after {stands_after_s:.2} s and {stands_after_m:.2} m in all\n"
     );
     if let Some(ahead_m) = stop_polygon_m {
         let _ = writeln!(
@@ -239,6 +244,9 @@ mod tests {
             stop_polygon_m: None,
             slowdown_polygon_m: None,
             slowdown_ratio: 1.0,
+            holds_s: 0.25,
+            stands_after_s: 0.75,
+            stands_after_m: 0.3,
         };
         let lines = told(&distances);
         for part in [
@@ -246,6 +254,7 @@ mod tests {
             "only while they are 3.00 m away",
             "stands below 0.90 m",
             "a radius of 0.25 m around the middle of the robot",
+            "holds for 0.25 s, then zero is commanded, and the robot stands after 0.75 s and 0.30 m",
         ] {
             assert!(lines.contains(part), "{part}: {lines}");
         }

@@ -166,6 +166,8 @@ struct TrackJson {
     probability: f64,
     head_robot_m: [f64; 3],
     head_odom_m: [f64; 3],
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    distance_is_guessed: bool,
     velocity_robot_mps: [f64; 2],
     upper_body_px: [f64; 4],
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -205,6 +207,7 @@ fn track_json(record: &FrameRecord<'_>, track: &Track) -> TrackJson {
         probability: rounded(probability(track.score)),
         head_robot_m: person.position.coords.map(rounded).into(),
         head_odom_m: record.head_in_odom(track).coords.map(rounded).into(),
+        distance_is_guessed: track.estimate.is_distance_guessed(),
         velocity_robot_mps: person.velocity.map(rounded).into(),
         upper_body_px: [region.x, region.y, region.width, region.height].map(rounded),
         joints: joints.map(joints_json),

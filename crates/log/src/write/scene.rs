@@ -88,7 +88,7 @@ fn colour_of(track: &Track) -> Color {
 
 /// Returns the ID of a track and its distance from the robot.
 fn label(track: &Track) -> String {
-    format!("{} {:.1} m", track.id, track.estimate.person.position.xy().coords.norm())
+    format!("{} {}", track.id, track.estimate.distance_text())
 }
 
 /// Returns the ends of the lines of a trail on the floor, in pairs.

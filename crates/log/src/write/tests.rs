@@ -44,6 +44,8 @@ fn log(dir: &Path, frames: u64, finish: bool) {
     let mut log = TrackLog::create(run, names(), OutputSettings::default(), "seed = 1\n").unwrap();
     let mut tentative = track(13);
     tentative.confirmed = false;
+    // Ten times the standard deviation of the other, which is a third of the distance.
+    tentative.estimate.covariance *= 100.0;
     for index in 1..=frames {
         with_record(index, &[track(12), tentative.clone()], |r| log.write(r)).unwrap();
     }
@@ -90,6 +92,8 @@ fn the_log_carries_tracks_poses_transforms_and_the_config() {
     let text: StringMsg = decode(&read(&bytes, "/people/tracks_json")[0]).unwrap();
     let json: serde_json::Value = serde_json::from_str(&text.data).unwrap();
     assert_eq!(json["tracks"][1]["confirmed"], false);
+    assert_eq!(json["tracks"][0].get("distance_is_guessed"), None);
+    assert_eq!(json["tracks"][1]["distance_is_guessed"], true);
     assert_eq!(json["wheel_speeds_mps"], serde_json::json!([0.25, 0.5]));
     let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
     assert_eq!(summary.attachment_indexes[0].name, "config.toml");

@@ -14,7 +14,8 @@ fn camera() -> Arc<Camera> {
     Arc::new(Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0))
 }
 
-/// Returns a person 3 m ahead who walks to the left, in frame `index` of ten a second.
+/// Returns a person 3 m ahead who walks to the left, in frame `index` of ten a second. From the sixth on the
+/// distance is a guess.
 fn moment(index: u64) -> (Frame, FrameReport) {
     let camera = camera();
     let stamp = Stamp::from_nanos(1_000_000_000 + index * 100_000_000);
@@ -23,7 +24,8 @@ fn moment(index: u64) -> (Frame, FrameReport) {
     let position = Point3::new(3.0, 0.05 * index as f64, 1.6);
     let person = Person { position, velocity: Vector2::new(0.0, 0.5) };
     let region = camera.upper_body(&position);
-    let covariance = SMatrix::<f64, 5, 5>::identity() * 0.01;
+    let sigma_m = if index < 6 { 0.1 } else { 0.5 };
+    let covariance = SMatrix::<f64, 5, 5>::identity() * (sigma_m * sigma_m);
     let track = Track::new(TrackId(7), Estimate::new(person, covariance, region), 3.0).with_age(5);
     let mut report = FrameReport::new(index, stamp);
     report.tracks = vec![track];
@@ -79,12 +81,14 @@ fn the_page_gets_the_newest_frame_with_image_trail_and_events() {
     assert_eq!(first["image_px"], serde_json::json!([640, 480]));
     let track = &first["frame"]["tracks"][0];
     assert_eq!((track["id"].as_u64(), track["state"].as_str()), (Some(7), Some("seen")));
+    assert_eq!(track.get("guess"), None);
     assert_eq!(track["trail"].as_array().unwrap().len(), 2 * 4, "four frames before");
     assert!(first["image"].as_str().unwrap().len() > 1000);
     assert_eq!(first["events"][0]["kind"], "started");
     offer(&live, 6);
     let second = now(&live, 5);
     assert_eq!(second["seq"], 6);
+    assert_eq!(second["frame"]["tracks"][0]["guess"], true);
     assert!(second["events"].as_array().unwrap().is_empty(), "told once");
 }
 

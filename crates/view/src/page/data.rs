@@ -156,6 +156,9 @@ pub struct TrackData {
     pub z: f64,
     /// Distance from the robot, m.
     pub d: f64,
+    /// True if the distance is a guess.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub guess: bool,
     /// Probability that it is a person.
     pub p: f64,
     /// Past places of the head in this image, pixels, x and y in turn.

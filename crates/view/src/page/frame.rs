@@ -77,6 +77,7 @@ fn track_data(track: &TrackState, heading: f64) -> TrackData {
         v: [cos * forward - sin * left, sin * forward + cos * left].map(|v| rounded(v, 1e2)),
         z: rounded(z, 1e2),
         d: rounded(track.head_robot_m[0].hypot(track.head_robot_m[1]), 1e2),
+        guess: track.distance_is_guessed,
         p: rounded(track.probability, 1e2),
         whole: None,
         trail: Vec::new(),
@@ -232,10 +233,12 @@ mod tests_of_data {
             confirmed: true,
             velocity_robot_mps: [1.0, 0.0],
             head_robot_m: [3.0, 4.0, 1.6],
+            distance_is_guessed: true,
             ..TrackState::default()
         };
         let data = track_data(&track, std::f64::consts::FRAC_PI_2);
         assert_eq!((data.v, data.d, data.state), ([0.0, 1.0], 5.0, "predicted"));
+        assert!(data.guess);
     }
 
     #[test]

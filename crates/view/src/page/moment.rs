@@ -38,6 +38,9 @@ pub struct TrackState {
     pub head_robot_m: [f64; 3],
     /// Centre of the head in the odometry frame, m.
     pub head_odom_m: [f64; 3],
+    /// True if the distance from the robot is a guess.
+    #[serde(default)]
+    pub distance_is_guessed: bool,
     /// Velocity along the axes of the robot frame, m/s.
     pub velocity_robot_mps: [f64; 2],
     /// Upper-body square, pixels.
@@ -80,6 +83,7 @@ impl TrackState {
             probability: 1.0 / (1.0 + (-track.score).exp()),
             head_robot_m: head.coords.into(),
             head_odom_m: [floor.x, floor.y, head.z],
+            distance_is_guessed: track.estimate.is_distance_guessed(),
             velocity_robot_mps: person.velocity.into(),
             upper_body_px: [region.x, region.y, region.width, region.height],
         }

@@ -115,6 +115,8 @@
   // The same in full.
   const stateOf = (track) => (track.state === "hidden" ? "predicted, hidden by another person"
     : track.state === "tentative" ? "not confirmed yet" : track.state);
+  // The distance, with `~` before one that is a guess.
+  const away = (track, digits) => `${track.guess ? "~" : ""}${fixed(track.d, digits)} m`;
   const trackKind = (track) =>
     track.state === "seen" ? colour(track.id)
       : track.state === "tentative" ? "tentative" : `${colour(track.id)} guess`;
@@ -163,7 +165,7 @@
       const taken = [];
       for (const track of frame.tracks) {
         const sign = frame.target === track.id ? "◎" : "";
-        parts.push(label(taken, shownBox(track), `${sign}${track.id}${STATES[track.state]} · ${fixed(track.d, 1)} m`, k));
+        parts.push(label(taken, shownBox(track), `${sign}${track.id}${STATES[track.state]} · ${away(track, 1)}`, k));
       }
     }
     // A picture of its own cuts off what lies outside of the image.
@@ -171,7 +173,7 @@
   };
 
   const describe = (track) =>
-    `track ${track.id}, ${stateOf(track)}, ${fixed(track.d, 1)} m away, ${fixed(Math.hypot(...track.v), 1)} m/s`;
+    `track ${track.id}, ${stateOf(track)}, ${away(track, 1)} away, ${fixed(Math.hypot(...track.v), 1)} m/s`;
 
   // ---- plan ------------------------------------------------------------------------------------
 
@@ -525,7 +527,7 @@
     if (!tracks.length) return place.replaceChildren(el("p", { class: "soft" }, "Nobody is tracked."));
     const row = (track) => el("tr", {},
       el("th", { scope: "row" }, el("span", { class: `swatch ${colour(track.id)}` }), String(track.id)),
-      el("td", {}, stateOf(track)), number(`${fixed(track.d, 2)} m`), number(`${fixed(Math.hypot(...track.v), 2)} m/s`), number(fixed(track.p, 2)));
+      el("td", {}, stateOf(track)), number(away(track, 2)), number(`${fixed(Math.hypot(...track.v), 2)} m/s`), number(fixed(track.p, 2)));
     return place.replaceChildren(table(`People of ${run.name}`, ["Track", "State", "Distance", "Speed", "Probability"], tracks.map(row)));
   };
 

@@ -8,6 +8,7 @@ use tagalong::log::msgs::{Image, LaserScan, Message, SceneUpdate};
 use super::*;
 
 const RVIZ: &str = include_str!("../../../rviz/tagalong.rviz");
+const LAUNCH: &str = include_str!("../../../launch/follow.launch.py");
 const FOXGLOVE: &str = include_str!("../../../foxglove/tagalong.json");
 
 /// Topics of `tracks.mcap` that the bridge does not publish: the layout is for both.
@@ -119,6 +120,7 @@ fn the_files_for_viewers_name_topics_and_types_that_are_published() {
     assert_eq!(displays.len(), 5, "{displays:?}");
     let sensors = ["/scan", "/camera/color/image_raw"];
     for Display { class, topic, is_reliable, is_latched } in &displays {
+        assert!(LAUNCH.contains(&format!("\"{topic}\"")), "the launch file does not remap {topic}");
         if sensors.contains(&topic.as_str()) {
             // A reliable subscriber hears no best-effort driver.
             assert!(!is_reliable, "{topic}");
