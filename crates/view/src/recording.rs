@@ -16,6 +16,8 @@ use toml::Table;
 
 /// Topic of the tracks as JSON in `tracks.mcap`.
 const TRACKS_TOPIC: &str = "/people/tracks_json";
+/// Least time that a result shows, s.
+const SHOWN_S: f64 = 0.05;
 
 /// Run of a pipeline over a log.
 #[derive(Clone, Debug, Default)]
@@ -175,17 +177,20 @@ impl RideFacts {
         }
 
         let share = self.distance_share().map_or("-".into(), |s| format!("{:.0} %", 100.0 * s));
+        let wrong = if self.wrong_s < SHOWN_S {
+            "the lock was never on another person or a thing".to_owned()
+        } else {
+            format!("the lock was on another person or a thing for {:.1} s", self.wrong_s)
+        };
         let stands = self.never_moved.as_ref();
         let stands = stands.map_or(String::new(), |why| format!("; the robot never moved ({why})"));
         format!(
             "{}{stands}{}; least room to people {}, to things {}; distance kept for {share} of the time in \
-             which the person was followed and walked slowly; the lock was on another person or a thing for \
-             {:.1} s",
+             which the person was followed and walked slowly; {wrong}",
             self.kept_in_words(),
             if self.touches() { "; the robot touched something" } else { "" },
             metres(self.clearance_people_m),
             metres(self.clearance_things_m),
-            self.wrong_s
         )
     }
 }

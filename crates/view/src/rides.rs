@@ -321,7 +321,16 @@ mod tests {
         assert!(page.contains("no; the robot never moved (silent)"), "{page}");
         let summary = rides[1].facts.summary();
         assert!(summary.contains("the robot never moved (silent)"), "{summary}");
-        assert!(summary.contains("the lock was on another person or a thing for"), "{summary}");
+    }
+
+    #[test]
+    fn the_time_on_another_person_is_said_where_there_is_one() {
+        let mut facts = RideFacts::default();
+        let never = "the lock was never on another person or a thing";
+        assert!(facts.summary().ends_with(never), "{}", facts.summary());
+        facts.wrong_s = 1.5;
+        let times = "the lock was on another person or a thing for 1.5 s";
+        assert!(facts.summary().ends_with(times), "{}", facts.summary());
     }
 
     #[test]

@@ -414,7 +414,8 @@ const begin = async () => {
   about = state.about;
   document.title = `Annotate ${about.log}`;
   byId("log").textContent = about.log;
-  byId("origin").textContent = `${about.origin}; ${about.depth ? "depth fills in the places" : "no depth, so boxes only"}.`;
+  const origin = about.origin.charAt(0).toUpperCase() + about.origin.slice(1);
+  byId("origin").textContent = `${origin}; ${about.depth ? "depth fills in the places" : "no depth, so boxes only"}.`;
   byId("frame").max = about.frames.length - 1;
   byId("stage").style.aspectRatio = `${about.size[0]} / ${about.size[1]}`;
   byId("stage").style.setProperty("--shape", about.size[0] / about.size[1]);

@@ -19,6 +19,9 @@ const PAUSE_S: f64 = 1.0;
 /// Distance on the picture below which positions are drawn once.
 const NEAR: f64 = 1.5;
 
+/// Width and height of a digit of an ID with the room around it, on the picture.
+const DIGIT: [f64; 2] = [8.0, 12.0];
+
 impl Extent {
     /// Returns the smallest square with a margin around all positions; `None` without any.
     pub fn around<'a>(all: impl IntoIterator<Item = &'a Trajectory>) -> Option<Self> {
@@ -56,6 +59,13 @@ pub fn plan(
 ) -> Markup {
     let ahead = Axis::new(Scale::Linear, extent.x_m, [PLOT.bottom, PLOT.top]);
     let left = Axis::new(Scale::Linear, extent.y_m, [PLOT.right, PLOT.left]);
+    let drawn: Vec<_> = tracks.iter().map(|track| lines(track, &left, &ahead)).collect();
+    let mut taken = Vec::new();
+    let labels: Vec<_> = tracks
+        .iter()
+        .zip(&drawn)
+        .map(|(track, lines)| last_of(lines).map(|end| Label::free(end, track.id, &mut taken)))
+        .collect();
     let body = html! {
         (axes(PLOT, &left, &ahead, ["y: metres to the left", "x: metres ahead"]))
         @for person in truth {
@@ -65,7 +75,9 @@ pub fn plan(
             }
         }
         // After the people, so that the thin lines lie on the wide ones.
-        @for (index, track) in tracks.iter().enumerate() { (track_lines(index, track, &lines(track, &left, &ahead))) }
+        @for (index, ((track, lines), label)) in tracks.iter().zip(&drawn).zip(&labels).enumerate() {
+            @if let Some(label) = label { (track_lines(index, track, lines, label)) }
+        }
     };
     picture(words, SIZE, &body)
 }
@@ -77,21 +89,64 @@ fn truth_line(line: &[(f64, f64)]) -> Markup {
     }
 }
 
-fn track_lines(index: usize, track: &Trajectory, lines: &[Vec<(f64, f64)>]) -> Markup {
-    let Some(&end) = lines.last().and_then(|line| line.last()) else { return html! {} };
-    // Near the right border the number goes to the left of the line's end.
-    let end_anchored = end.0 > PLOT.right - 24.0;
-    let (dx, anchor) = if end_anchored { (-7.0, "end") } else { (7.0, "start") };
+/// Returns the end of a track on the picture.
+fn last_of(lines: &[Vec<(f64, f64)>]) -> Option<(f64, f64)> {
+    lines.last()?.last().copied()
+}
+
+/// Place of the ID beside the end of its track.
+#[derive(Clone, Copy, PartialEq, Debug)]
+struct Label {
+    /// End of the track.
+    end: (f64, f64),
+    /// Left end of the text with its room.
+    left: f64,
+    /// Lower edge of the text.
+    base: f64,
+    /// Width of the text with its room.
+    width: f64,
+}
+
+impl Label {
+    /// Returns the first place around the end that no other ID has, so that two of them are not read
+    /// as one number; it is on the right and above, and near the right border on the left.
+    fn free(end: (f64, f64), id: i64, taken: &mut Vec<Self>) -> Self {
+        let width = DIGIT[0] * id.to_string().len() as f64;
+        let sides = if end.0 > PLOT.right - 24.0 { [-7.0 - width, 7.0] } else { [7.0, -7.0 - width] };
+        let places: Vec<Self> = [-5.0, 13.0, -5.0 - DIGIT[1], 13.0 + DIGIT[1]]
+            .iter()
+            .flat_map(|dy| sides.map(|dx| Self { end, left: end.0 + dx, base: end.1 + dy, width }))
+            .collect();
+        let place = places.iter().find(|place| !taken.iter().any(|other| place.is_over(other)));
+        let place = *place.unwrap_or(&places[0]);
+        taken.push(place);
+        place
+    }
+
+    fn is_over(&self, other: &Self) -> bool {
+        let across = self.left < other.left + other.width && other.left < self.left + self.width;
+        across && (self.base - other.base).abs() < DIGIT[1]
+    }
+}
+
+fn track_lines(
+    index: usize,
+    track: &Trajectory,
+    lines: &[Vec<(f64, f64)>],
+    label: &Label,
+) -> Markup {
+    // The text itself is narrower than its room: it begins or ends beside the mark.
+    let is_left = label.left < label.end.0;
+    let (x, anchor) =
+        if is_left { (label.left + label.width, "end") } else { (label.left, "start") };
     html! {
         g.(track_class(track.id)) {
             @for line in lines {
                 polyline class="stroke" points=(points(line.iter().copied()))
                     stroke-dasharray=(dashes(index)) {}
             }
-            (mark(index, end, 3.5))
-            text class="label" x=(px(end.0 + dx)) y=(px(end.1 - 5.0)) text-anchor=(anchor) {
-                (track.id)
-            }
+            (mark(index, label.end, 3.5))
+            text class="label" x=(px(x)) y=(px(label.base)) text-anchor=(anchor) { (track.id) }
             (hint(&format!("track {}", track.id)))
         }
     }

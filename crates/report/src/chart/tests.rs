@@ -106,6 +106,27 @@ proptest! {
 }
 
 #[test]
+fn ids_of_tracks_that_end_at_one_place_are_apart() {
+    let tracks: Vec<Trajectory> = [7, 2, 12, 5]
+        .map(|id| Trajectory { id, points: vec![[0.0, 1.0, 1.0], [1.0, 4.0, 0.0]] })
+        .into();
+    let extent = Extent::around(&tracks).expect("places");
+    let svg = plan(&[], &tracks, extent, &WORDS).into_string();
+    let labels: Vec<&str> = svg.split("<text class=\"label\"").skip(1).collect();
+    let places: Vec<[f64; 2]> = labels
+        .iter()
+        .map(|text| ["x", "y"].map(|name| attributes(text, name)[0].parse().expect("a number")))
+        .collect();
+    assert_eq!(places.len(), tracks.len());
+    for (at, [x, y]) in places.iter().enumerate() {
+        for [other_x, other_y] in &places[..at] {
+            let is_apart = (x - other_x).abs() >= 14.0 || (y - other_y).abs() >= 12.0;
+            assert!(is_apart, "{places:?}");
+        }
+    }
+}
+
+#[test]
 fn ticks_are_round() {
     for (axis, expected) in [
         (Axis::around(Scale::Linear, [0.13, 0.87], [0.0, 1.0]), "0.0 0.2 0.4 0.6 0.8 1.0"),

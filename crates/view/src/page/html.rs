@@ -164,6 +164,7 @@ fn image_marks() -> Markup {
         (mark("box-seen", "seen"))
         (mark("box-guess", "predicted"))
         (mark("box-tentative", "not confirmed yet"))
+        span data-layer="target" { (mark("sign", "target")) }
         span data-layer="truth" { (mark("box-truth", "annotated")) }
         span data-layer="truth" { (mark("box-miss", "missed")) }
         span data-layer="dropped" { (mark("box-dropped", "dropped")) }
@@ -176,6 +177,7 @@ fn plan_marks() -> Markup {
         (mark("dot", "seen"))
         (mark("dot ring", "predicted"))
         (mark("dot ring unsure", "not confirmed yet"))
+        span data-layer="target" { (mark("to-target", "target")) }
         (mark("robot-path", "robot and its way"))
         span data-layer="scan" { (mark("laser", "laser")) }
         span data-layer="truth" { (mark("spot", "annotated")) }

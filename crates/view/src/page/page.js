@@ -405,7 +405,7 @@
   // A layer that is off has no marks to explain.
   const drawLegends = () => {
     const isOn = { truth: data.truth && id("show-truth").checked, dropped: id("show-dropped").checked,
-      scan: Boolean(data.scans) };
+      scan: (data.scans || []).some(Boolean), target: !id("drive").hidden };
     for (const mark of document.querySelectorAll("[data-layer]")) mark.hidden = !isOn[mark.dataset.layer];
   };
 
