@@ -24,6 +24,7 @@ mod planners;
 mod printed;
 mod real;
 pub mod realism;
+mod recognition;
 mod recorded;
 mod rgbd_compressive;
 mod scatter;

@@ -2,6 +2,7 @@
 //! the log.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use nalgebra::{Isometry2, Isometry3, Point3};
 use tagalong_core::Frame;
@@ -55,15 +56,8 @@ pub(crate) fn trial(
     }
 
     let Some(folder) = lab.data.as_ref().map(|data| data.join("logs")) else { return Ok(None) };
+    let Some(people) = people(&folder, log)? else { return Ok(None) };
     let path = folder.join(log);
-    let truth = folder.join(log).with_extension("people.csv");
-    if !truth.exists() {
-        return Ok(None);
-    }
-    let rows = people::parse(&read(&truth)?, &truth.display().to_string());
-    let rows = rows.map_err(|error| ReproduceError::of(log, error))?;
-    let mut people: BTreeMap<u64, Vec<Annotated>> = BTreeMap::new();
-    rows.into_iter().for_each(|row| people.entry(u64::from(row.frame)).or_default().push(row));
     let inputs = Inputs::NONE.require(Input::Colour).require(Input::Depth);
     let path = path.with_extension("mcap");
     let source = FrameSource::open(&path, &InputSettings::default(), &Limits::default(), inputs);
@@ -86,6 +80,25 @@ pub(crate) fn trial(
     Ok(camera.map(|camera| Trial { seed: 0, camera, furniture: Vec::new(), moments, runs }))
 }
 
+/// Returns the annotated people of a log, by the number of the frame; `None` if there is no such log.
+///
+/// # Errors
+/// Annotations that cannot be read.
+pub(crate) fn people(
+    folder: &Path,
+    log: &str,
+) -> Result<Option<BTreeMap<u64, Vec<Annotated>>>, ReproduceError> {
+    let truth = folder.join(log).with_extension("people.csv");
+    if !truth.exists() {
+        return Ok(None);
+    }
+    let rows = people::parse(&read(&truth)?, &truth.display().to_string());
+    let rows = rows.map_err(|error| ReproduceError::of(log, error))?;
+    let mut people: BTreeMap<u64, Vec<Annotated>> = BTreeMap::new();
+    rows.into_iter().for_each(|row| people.entry(u64::from(row.frame)).or_default().push(row));
+    Ok(Some(people))
+}
+
 /// Returns the annotations of a frame. The poses of the robot are not used.
 fn moment(frame: &Frame, known: &[Annotated]) -> Moment {
     let pose = &frame.camera.robot_from_camera;
@@ -98,7 +111,7 @@ fn moment(frame: &Frame, known: &[Annotated]) -> Moment {
 }
 
 /// Converts an annotation; heads are annotated at their surface. `None` without a place.
-fn annotated(row: &Annotated, robot_from_camera: &Isometry3<f64>) -> Option<Truth> {
+pub(crate) fn annotated(row: &Annotated, robot_from_camera: &Isometry3<f64>) -> Option<Truth> {
     fn rect(r: &tagalong_eval::Region) -> Rect {
         Rect::new(r.x, r.y, r.width, r.height)
     }

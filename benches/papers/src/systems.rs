@@ -1,7 +1,9 @@
 //! The list of published systems.
 
 use crate::findings::System;
-use crate::{joint_particle, laser, omni_appearance, planners, rgbd_compressive, stereo};
+use crate::{
+    joint_particle, laser, omni_appearance, planners, recognition, rgbd_compressive, stereo,
+};
 
 /// All systems, in the order of the papers.
 pub const SYSTEMS: &[System] = &[
@@ -12,6 +14,7 @@ pub const SYSTEMS: &[System] = &[
     omni_appearance::SYSTEM,
     laser::SYSTEM,
     planners::SYSTEM,
+    recognition::SYSTEM,
 ];
 
 /// Returns the system of this name.

@@ -6,7 +6,7 @@ use tagalong_core::{EgoMotion, Frame, Joints, Person, Result, Track, TrackId};
 use tagalong_vision::{Appearance, Describer};
 
 use super::chooser::Chooser;
-use super::memory::{Differences, Memory, logit, probability};
+use super::memory::{AppearanceMemory, Differences, logit, probability};
 use super::settings::TargetSettings;
 
 /// Bound of the log-odds: no single look is certain.
@@ -154,7 +154,7 @@ pub(crate) struct TargetLock {
     why: &'static str,
     since_s: f64,
     track: Option<TrackId>,
-    memory: Memory,
+    memory: AppearanceMemory,
     /// Log-odds that the followed track is the person.
     belief: f64,
     chooser: Chooser,
@@ -178,7 +178,7 @@ impl TargetLock {
             why: "nobody was chosen yet",
             since_s: 0.0,
             track: None,
-            memory: Memory::default(),
+            memory: AppearanceMemory::default(),
             belief: 0.0,
             chooser: Chooser::default(),
             doubtful: false,

@@ -7,27 +7,27 @@ const KEPT: usize = 8;
 
 /// Memory of the appearance of the person, and of others.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Memory {
+pub struct AppearanceMemory {
     own: Gallery,
     others: Gallery,
     /// Sum of the heights of the head, m, and their number.
     heights: (f64, f64),
 }
 
-impl Memory {
+impl AppearanceMemory {
     /// Learns an appearance of the person.
-    pub(crate) fn learn(&mut self, looks: Appearance) {
+    pub fn learn(&mut self, looks: Appearance) {
         self.heights = (self.heights.0 + looks.height_m, self.heights.1 + 1.0);
         self.own.add(looks, KEPT);
     }
 
     /// Learns an appearance of another person.
-    pub(crate) fn learn_other(&mut self, looks: Appearance) {
+    pub fn learn_other(&mut self, looks: Appearance) {
         self.others.add(looks, 0);
     }
 
     /// Returns the differences of an appearance from the person's; `None` without a memory.
-    pub(crate) fn differences(&self, looks: &Appearance) -> Option<Differences> {
+    pub fn differences(&self, looks: &Appearance) -> Option<Differences> {
         let own = self.own.nearest(looks)?;
         let other = self.others.nearest(looks);
         let height_m = self.heights.0 / self.heights.1;
@@ -62,7 +62,7 @@ pub struct Differences {
 
 impl Differences {
     /// Returns the log-odds that it is the person; an unknown difference adds nothing.
-    pub(crate) fn log_odds(&self, settings: &LooksSettings) -> f64 {
+    pub fn log_odds(&self, settings: &LooksSettings) -> f64 {
         fn say(difference: Option<f64>, [even, weight]: [f64; 2]) -> f64 {
             difference.map_or(0.0, |difference| weight * (even - difference))
         }
@@ -97,14 +97,14 @@ mod tests {
 
     #[test]
     fn without_a_memory_there_is_nothing_to_differ_from() {
-        let mut memory = Memory::default();
+        let mut memory = AppearanceMemory::default();
         memory.learn_other(looks(1.6, Some(1)));
         assert_eq!(memory.differences(&looks(1.6, Some(1))), None);
     }
 
     #[test]
     fn the_most_like_of_what_is_remembered_counts_and_the_mean_height() {
-        let mut memory = Memory::default();
+        let mut memory = AppearanceMemory::default();
         memory.learn(looks(1.5, Some(1)));
         memory.learn(looks(1.6, Some(2)));
         let found = memory.differences(&looks(1.75, Some(2))).unwrap();
@@ -117,7 +117,7 @@ mod tests {
 
     #[test]
     fn looks_are_held_against_those_of_others() {
-        let mut memory = Memory::default();
+        let mut memory = AppearanceMemory::default();
         memory.learn(looks(1.6, Some(1)));
         memory.learn_other(looks(1.6, Some(2)));
         assert_eq!(

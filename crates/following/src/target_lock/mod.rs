@@ -16,6 +16,6 @@ pub use chooser::ChoiceRule;
 pub(crate) use chooser::{bearing_deg, distance_m, nearest_in_front};
 pub(crate) use lock::TargetLock;
 pub use lock::{Likeness, LockReport, LockState};
-pub use memory::Differences;
+pub use memory::{AppearanceMemory, Differences};
 pub(crate) use search::Search;
 pub use settings::{LooksSettings, SearchSettings, TargetSettings};
