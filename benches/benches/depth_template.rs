@@ -13,15 +13,14 @@ use tagalong_core::{DepthImage, Detector, EgoMotion, Frame, Funnel, Images, Quer
 use tagalong_depth_template::{
     Bank, DepthTemplate, DepthTemplateConfig, Direction, Matcher, Pose, render,
 };
-use tagalong_geometry::{Camera, Distortion, Pinhole};
+use tagalong_geometry::{Camera, Pinhole};
 use tagalong_pipeline::Pipeline;
 use tagalong_vision::RowSums;
 
 const CONFIG: &str = include_str!("../../configs/depth-ekf.toml");
 
 fn camera() -> Arc<Camera> {
-    let lens = Pinhole { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
-    Arc::new(Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0))
+    Arc::new(Camera::mounted(Pinhole::centred(525.0, 640, 480), 640, 480, 1.2, 0.0, 0.0))
 }
 
 /// Four people in front of a wall, on a floor, at 640x480.

@@ -15,11 +15,11 @@ use tagalong_core::{
     TrackId,
 };
 use tagalong_filters::ekf::{Config, Ekf};
-use tagalong_geometry::{Camera, Distortion, Pinhole};
+use tagalong_geometry::{Camera, Pinhole};
 
 fn main() -> Result<()> {
-    let lens = Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
-    let camera = Arc::new(Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0));
+    let camera =
+        Arc::new(Camera::mounted(Pinhole::centred(500.0, 640, 480), 640, 480, 1.2, 0.0, 0.0));
     let motion = EgoMotion::at_rest(0.1);
     let frame = Frame::new(1, Stamp::default(), Arc::clone(&camera), motion, Images::default());
     let seen =

@@ -17,7 +17,7 @@ use tagalong_core::{
     Detection, EgoMotion, Evidence, Filter, Frame, Images, Likelihood, Person, Result, Stamp,
     TrackId,
 };
-use tagalong_geometry::{Camera, Distortion, Pinhole};
+use tagalong_geometry::{Camera, Pinhole};
 use tagalong_joint_particle::{Config, JointParticle, LikelihoodMap, Method, PositionPair};
 use tagalong_math::number_at;
 
@@ -41,8 +41,8 @@ impl Likelihood for Wide {
 /// Returns the median time of a frame, us: prediction, weighing, resampling where it is due, and the
 /// estimate.
 fn step() -> Result<f64> {
-    let lens = Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
-    let camera = Arc::new(Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0));
+    let camera =
+        Arc::new(Camera::mounted(Pinhole::centred(500.0, 640, 480), 640, 480, 1.2, 0.0, 0.0));
     let motion = EgoMotion::at_rest(0.1);
     let frame = Frame::new(1, Stamp::default(), Arc::clone(&camera), motion, Images::default());
     let config = Config { particles: 625, ..Config::default() };

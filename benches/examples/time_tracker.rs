@@ -18,7 +18,7 @@ use tagalong_core::{
     Capabilities, Detection, Detector, EgoMotion, Frame, Funnel, Images, Inputs, Query, Result,
     Stamp,
 };
-use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole};
+use tagalong_geometry::{Camera, ImageBox, Pinhole};
 use tagalong_math::{RandomSource, SplitMix64};
 use tagalong_pipeline::Pipeline;
 
@@ -80,8 +80,8 @@ fn median_us(people: usize) -> f64 {
     );
     let mut pipeline =
         Pipeline::builder(&registry).from_toml(&config).expect("the config is right");
-    let lens = Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
-    let camera = Arc::new(Camera::mounted(lens, 640, 480, 1.5, 0.0, 0.0));
+    let camera =
+        Arc::new(Camera::mounted(Pinhole::centred(500.0, 640, 480), 640, 480, 1.5, 0.0, 0.0));
     let mut times = Vec::new();
     for index in 0..FIRST + TIMED {
         let stamp = Stamp::from_nanos(index * FRAME_NS);

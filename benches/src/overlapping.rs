@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::{Point2, Point3, Vector2};
 use tagalong_core::{DepthImage, EgoMotion, Frame, Images, Person, Stamp};
 use tagalong_depth_template::render;
-use tagalong_geometry::{Camera, Distortion, Pinhole};
+use tagalong_geometry::{Camera, Pinhole};
 
 const HEADS: [Point3<f64>; 2] = [Point3::new(2.5, 0.1, 1.6), Point3::new(3.4, -0.15, 1.65)];
 
@@ -19,8 +19,7 @@ pub fn frame(index: u64, depth: &Arc<DepthImage>, camera: &Arc<Camera>) -> Frame
 
 /// Returns the camera of P3, 512x384.
 pub fn camera() -> Arc<Camera> {
-    let lens = Pinhole { fx: 366.0, fy: 366.0, cx: 255.5, cy: 191.5, distortion: Distortion::None };
-    Arc::new(Camera::mounted(lens, 512, 384, 1.2, 0.0, 0.0))
+    Arc::new(Camera::mounted(Pinhole::centred(366.0, 512, 384), 512, 384, 1.2, 0.0, 0.0))
 }
 
 /// Returns the depth of two people that overlap, in front of a wall, m.

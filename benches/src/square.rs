@@ -7,12 +7,11 @@ use tagalong_core::{
     DepthImage, EgoMotion, Estimate, Frame, GreyImage, Images, Person, RgbImage, Stamp, Track,
     TrackId,
 };
-use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
+use tagalong_geometry::{Camera, Pinhole, Rect};
 
 /// Returns the camera, 640x480.
 pub fn camera() -> Arc<Camera> {
-    let lens = Pinhole { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
-    Arc::new(Camera::mounted(lens, 640, 480, 1.3, 0.0, 0.0))
+    Arc::new(Camera::mounted(Pinhole::centred(525.0, 640, 480), 640, 480, 1.3, 0.0, 0.0))
 }
 
 /// Returns a patterned square before a patterned wall at 6 m, and its depth, m.

@@ -1,7 +1,7 @@
-"""Prints how OpenCV decodes bytes: the tables in the tests of crates/log/src/images.
+"""Prints how OpenCV decodes bytes, for the tests of crates/log/src/images.
 
     pip install opencv-python-headless numpy
-    python tests/clients/encodings_opencv.py
+    python tests/clients/encodings_opencv.py > crates/log/tests/data/encodings-opencv.txt
 """
 
 import cv2
@@ -32,4 +32,4 @@ y, uv = noise(6, 4)[:2], noise(6, 4)[2:].reshape(2, 4, 2)
 pairs = np.stack([y, uv[..., 0], y, uv[..., 1]], axis=-1).reshape(2, 8, 2)
 tables.append(("nv24", cv2.cvtColor(pairs, cv2.COLOR_YUV2RGB_YUY2)[:, ::2]))
 for name, image in tables:
-    print(f'("{name}", {image.shape[1]}, {image.shape[0]}, &{image.reshape(-1).tolist()}),')
+    print(name, image.shape[1], image.shape[0], *image.reshape(-1))

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use tagalong_config::Registry;
 use tagalong_core::{EgoMotion, Frame, Images, RgbImage, Stamp};
-use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
+use tagalong_geometry::{Camera, Pinhole, Rect};
 use tagalong_pipeline::{FrameReport, Pipeline};
 
 const FRAMES: u64 = 30;
@@ -50,8 +50,8 @@ fn left(index: u64) -> usize {
 
 /// A bright person of 96 x 192 pixels with stripes before a dark wall.
 fn frame(index: u64) -> Frame {
-    let lens = Pinhole { fx: 300.0, fy: 300.0, cx: 191.5, cy: 191.5, distortion: Distortion::None };
-    let camera = Arc::new(Camera::mounted(lens, 384, 384, 1.0, 0.0, 0.0));
+    let camera =
+        Arc::new(Camera::mounted(Pinhole::centred(300.0, 384, 384), 384, 384, 1.0, 0.0, 0.0));
     let left = left(index);
     let colour = RgbImage::from_fn(384, 384, |x, y| {
         if !(left..left + 96).contains(&x) || !(96..288).contains(&y) {

@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use tagalong_config::Registry;
 use tagalong_core::{DepthImage, EgoMotion, ExternalDetection, Frame, Images, Stamp, WheelSpeeds};
-use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
+use tagalong_geometry::{Camera, Pinhole, Rect};
 use tagalong_pipeline::Pipeline;
 
 /// The memory of the process is that of all its tests, so one runs at a time.
@@ -34,8 +34,7 @@ fn resident_kib() -> Option<u64> {
 }
 
 fn camera() -> Arc<Camera> {
-    let lens = Pinhole { fx: 80.0, fy: 80.0, cx: 79.5, cy: 59.5, distortion: Distortion::None };
-    Arc::new(Camera::mounted(lens, 160, 120, 1.2, 0.0, 0.0))
+    Arc::new(Camera::mounted(Pinhole::centred(80.0, 160, 120), 160, 120, 1.2, 0.0, 0.0))
 }
 
 /// Returns the depth of an empty room: the floor, and a wall 6 m away.

@@ -1,17 +1,15 @@
 //! Conversion of messages from DDS to the frame source.
 //!
 //! DDS delivers messages that own their bytes; the log reader takes them as they lie on the wire.
-//! Images and points, which it borrows, therefore have counterparts here that own their bytes, and
-//! received messages are encoded again: a copy of an image, a tenth of a millisecond.
+//! Images and points, which it borrows, therefore have counterparts here that own their bytes and lie
+//! on the wire alike, and received messages are encoded again: a copy of an image, a tenth of a
+//! millisecond.
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_bytes::ByteBuf;
 use tagalong::core::Stamp;
-use tagalong::log::msgs::{
-    CompressedImage, CompressedVideo, FfmpegPacket, Header, Image, LaserScan, PointCloud2,
-    PointField, Time, encode,
-};
+use tagalong::log::msgs::{Header, LaserScan, PointField, Time};
 
 /// Number of images, or clouds of points, that wait for the thread that makes frames.
 pub(crate) const IMAGES: usize = 2;
@@ -19,12 +17,9 @@ pub(crate) const IMAGES: usize = 2;
 pub(crate) const OTHERS: usize = 64;
 
 /// A message of which frames can be made.
-pub(crate) trait FrameMessage: DeserializeOwned + Send + 'static {
+pub(crate) trait FrameMessage: DeserializeOwned + Serialize + Send + 'static {
     /// Returns the time of the measurement.
     fn stamp(&self) -> Stamp;
-
-    /// Returns the message as it lies on the wire.
-    fn encode(&self) -> Vec<u8>;
 
     /// Returns the number of messages like this one that wait; of images the newest alone are of use.
     fn room(&self) -> usize {
@@ -32,7 +27,7 @@ pub(crate) trait FrameMessage: DeserializeOwned + Send + 'static {
     }
 }
 
-/// `sensor_msgs/Image` that owns its pixels; field by field as [`Image`].
+/// `sensor_msgs/Image` that owns its pixels; field by field as `Image` of the log reader.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct OwnedImage {
     header: Header,
@@ -151,29 +146,11 @@ impl FrameMessage for OwnedImage {
     fn stamp(&self) -> Stamp {
         self.header.stamp()
     }
-
-    fn encode(&self) -> Vec<u8> {
-        encode(&Image {
-            header: self.header.clone(),
-            height: self.height,
-            width: self.width,
-            encoding: self.encoding.clone(),
-            is_bigendian: self.is_bigendian,
-            step: self.step,
-            data: &self.data,
-        })
-    }
 }
 
 impl FrameMessage for OwnedCompressedImage {
     fn stamp(&self) -> Stamp {
         self.header.stamp()
-    }
-
-    fn encode(&self) -> Vec<u8> {
-        let header = self.header.clone();
-        let format = self.format.clone();
-        encode(&CompressedImage { header, format, data: &self.data })
     }
 
     fn room(&self) -> usize {
@@ -189,15 +166,6 @@ impl FrameMessage for OwnedVideo {
         self.timestamp.into()
     }
 
-    fn encode(&self) -> Vec<u8> {
-        encode(&CompressedVideo {
-            timestamp: self.timestamp,
-            frame_id: self.frame_id.clone(),
-            data: &self.data,
-            format: self.format.clone(),
-        })
-    }
-
     fn room(&self) -> usize {
         OTHERS
     }
@@ -206,19 +174,6 @@ impl FrameMessage for OwnedVideo {
 impl FrameMessage for OwnedFfmpegPacket {
     fn stamp(&self) -> Stamp {
         self.header.stamp()
-    }
-
-    fn encode(&self) -> Vec<u8> {
-        encode(&FfmpegPacket {
-            header: self.header.clone(),
-            width: self.width,
-            height: self.height,
-            encoding: self.encoding.clone(),
-            pts: self.pts,
-            flags: self.flags,
-            is_bigendian: self.is_bigendian,
-            data: &self.data,
-        })
     }
 
     fn room(&self) -> usize {
@@ -230,29 +185,11 @@ impl FrameMessage for OwnedPointCloud {
     fn stamp(&self) -> Stamp {
         self.header.stamp()
     }
-
-    fn encode(&self) -> Vec<u8> {
-        encode(&PointCloud2 {
-            header: self.header.clone(),
-            height: self.height,
-            width: self.width,
-            fields: self.fields.clone(),
-            is_bigendian: self.is_bigendian,
-            point_step: self.point_step,
-            row_step: self.row_step,
-            data: self.data.as_slice().into(),
-            is_dense: self.is_dense,
-        })
-    }
 }
 
 impl FrameMessage for LaserScan {
     fn stamp(&self) -> Stamp {
         self.header.stamp()
-    }
-
-    fn encode(&self) -> Vec<u8> {
-        encode(self)
     }
 
     fn room(&self) -> usize {
@@ -273,13 +210,23 @@ pub(crate) fn ros_topic(dds: &str) -> Option<&str> {
 
 #[cfg(test)]
 mod tests {
-    use tagalong::log::msgs::decode;
+    use tagalong::log::msgs::{
+        CompressedImage, CompressedVideo, FfmpegPacket, Image, PointCloud2, decode, encode,
+    };
 
     use super::*;
 
+    /// Returns a message as the log reader reads it from the bytes of its counterpart, encoded again.
+    macro_rules! read_again {
+        ($borrowing:ident, $bytes:expr) => {
+            encode(&decode::<$borrowing<'_>>($bytes).unwrap())
+        };
+    }
+
     #[test]
     fn what_owns_its_bytes_lies_on_the_wire_as_what_borrows_them() {
-        let header = Header::new(Stamp::from_nanos(7), "camera");
+        let stamp = Stamp::from_nanos(7);
+        let header = Header::new(stamp, "camera");
         let image = OwnedImage {
             header: header.clone(),
             height: 1,
@@ -289,25 +236,28 @@ mod tests {
             step: 3,
             data: ByteBuf::from([1, 2, 3]),
         };
-        let bytes = image.encode();
-        assert_eq!(bytes, encode(&image));
+        let bytes = encode(&image);
+        assert_eq!(read_again!(Image, &bytes), bytes);
         assert_eq!(decode::<Image<'_>>(&bytes).unwrap().data, [1, 2, 3]);
         let data = ByteBuf::from([9; 5]);
-        let compressed = OwnedCompressedImage { header, format: "jpeg".into(), data };
-        assert_eq!((compressed.encode(), compressed.room()), (encode(&compressed), IMAGES));
-        let packet = OwnedCompressedImage { data: ByteBuf::from([0, 0, 1, 0x65]), ..compressed };
+        let compressed =
+            OwnedCompressedImage { header: header.clone(), format: "jpeg".into(), data };
+        let bytes = encode(&compressed);
+        assert_eq!(read_again!(CompressedImage, &bytes), bytes);
+        assert_eq!(compressed.room(), IMAGES);
+        let data = ByteBuf::from([0, 0, 1, 0x65]);
+        let packet = OwnedCompressedImage { data: data.clone(), ..compressed };
         assert_eq!(packet.room(), OTHERS);
-        let stamp = Stamp::from_nanos(7);
-        let data = ByteBuf::from([0, 0, 1, 0x65]);
-        let video = OwnedVideo { timestamp: stamp.into(), data, ..OwnedVideo::default() };
-        assert_eq!((video.encode(), video.stamp()), (encode(&video), stamp));
-        let data = ByteBuf::from([0, 0, 1, 0x65]);
-        let header = Header::new(stamp, "camera");
+        let video =
+            OwnedVideo { timestamp: stamp.into(), data: data.clone(), ..OwnedVideo::default() };
+        let bytes = encode(&video);
+        assert_eq!((read_again!(CompressedVideo, &bytes), video.stamp()), (bytes, stamp));
         let packet = OwnedFfmpegPacket { header, pts: 5, data, ..OwnedFfmpegPacket::default() };
-        assert_eq!((packet.encode(), packet.stamp()), (encode(&packet), stamp));
-        let header = Header::new(Stamp::from_nanos(7), "lidar");
+        let bytes = encode(&packet);
+        assert_eq!((read_again!(FfmpegPacket, &bytes), packet.stamp()), (bytes, stamp));
+        let header = Header::new(stamp, "lidar");
         let cloud = encode(&PointCloud2::of_points(header, &[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]));
-        assert_eq!(decode::<OwnedPointCloud>(&cloud).unwrap().encode(), cloud);
+        assert_eq!(encode(&decode::<OwnedPointCloud>(&cloud).unwrap()), cloud);
     }
 
     #[test]

@@ -329,7 +329,7 @@ impl Network {
         let clock = Arc::clone(clock);
         self.ear(topic, message_type, sensor(depth), inbox, move |message: M| {
             clock.record_arrival(message.stamp());
-            (message.encode(), message.room())
+            (encode(&message), message.room())
         })
     }
 

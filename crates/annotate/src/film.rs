@@ -250,15 +250,14 @@ fn unpacked(bytes: &[u8], width: usize, height: usize) -> Option<DepthImage> {
 
 #[cfg(test)]
 pub mod tests {
-    use tagalong_geometry::{Distortion, Pinhole};
+    use tagalong_geometry::Pinhole;
 
     use super::*;
 
     /// Returns a film of frames with a wall, and a person 2.5 m before the middle of it.
     pub fn film(frames: u32) -> Film {
-        let lens =
-            Pinhole { fx: 260.0, fy: 260.0, cx: 159.5, cy: 119.5, distortion: Distortion::None };
-        let camera = Arc::new(Camera::mounted(lens, 320, 240, 1.2, 0.0, 0.0));
+        let camera =
+            Arc::new(Camera::mounted(Pinhole::centred(260.0, 320, 240), 320, 240, 1.2, 0.0, 0.0));
         let depth = DepthImage::from_fn(320, 240, |x, y| {
             if (140..180).contains(&x) && y > 60 { 2.5 } else { 6.0 }
         });

@@ -209,14 +209,12 @@ fn body(figure: &Figure) -> impl Iterator<Item = Ellipsoid> {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_geometry::{Distortion, HEAD_RADIUS_M, Pinhole};
+    use tagalong_geometry::{HEAD_RADIUS_M, Pinhole};
 
     use super::*;
 
     fn camera(pitch_down_rad: f64) -> Camera {
-        let lens =
-            Pinhole { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
-        Camera::mounted(lens, 640, 480, 1.2, pitch_down_rad, 0.0)
+        Camera::mounted(Pinhole::centred(525.0, 640, 480), 640, 480, 1.2, pitch_down_rad, 0.0)
     }
 
     fn depth_at(images: &Images, camera: &Camera, point: Point3<f64>) -> f64 {

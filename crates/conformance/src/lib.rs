@@ -6,10 +6,7 @@
 //!
 //! ```no_run
 //! # fn register(_: &mut tagalong_config::Registry) {}
-//! let mut registry = tagalong_config::Registry::default();
-//! register(&mut registry);
-//! let failures = tagalong_conformance::check_all(&registry);
-//! assert!(failures.is_empty(), "{failures:#?}");
+//! tagalong_conformance::assert_conforms(register);
 //! ```
 //!
 //! A panic inside a plugin is caught and becomes a [`Failure`] that names the plugin and the check.
@@ -178,6 +175,18 @@ impl<'a> Suite<'a> {
 #[must_use = "broken promises are returned, not asserted"]
 pub fn check_all(registry: &Registry) -> Vec<Failure> {
     Suite::new(registry).check_all()
+}
+
+/// Asserts that all plugins of a `register` function pass [`check_all`].
+///
+/// # Panics
+/// With all failures, if there are any.
+#[track_caller]
+pub fn assert_conforms(register: impl FnOnce(&mut Registry)) {
+    let mut registry = Registry::default();
+    register(&mut registry);
+    let failures = check_all(&registry);
+    assert!(failures.is_empty(), "{failures:#?}");
 }
 
 /// Returns the names of all checks that apply to a kind of plugin.

@@ -371,7 +371,7 @@ mod tests {
     use nalgebra::Point3;
 
     use super::*;
-    use tagalong_geometry::{Distortion, Pinhole};
+    use tagalong_geometry::Pinhole;
 
     static COMPUTED: AtomicUsize = AtomicUsize::new(0);
 
@@ -386,8 +386,7 @@ mod tests {
     }
 
     fn frame(images: Images) -> Frame {
-        let lens = Pinhole { fx: 5.0, fy: 5.0, cx: 1.5, cy: 1.5, distortion: Distortion::None };
-        let camera = Arc::new(Camera::mounted(lens, 4, 4, 1.0, 0.0, 0.0));
+        let camera = Arc::new(Camera::mounted(Pinhole::centred(5.0, 4, 4), 4, 4, 1.0, 0.0, 0.0));
         Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.0), images)
     }
 

@@ -27,6 +27,7 @@
 
 mod associator;
 mod control;
+mod defaults;
 mod detection;
 mod detector;
 mod error;

@@ -1,7 +1,7 @@
 use nalgebra::Point2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{DiffDrive, Error, Result};
+use tagalong_core::{DiffDrive, Error, Result, settings};
 
 use crate::collision_monitor::Footprint;
 
@@ -34,58 +34,45 @@ pub enum OdometrySource {
     None,
 }
 
-/// Drive of the robot.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct RobotSettings {
-    /// Half the distance between the driven wheels, m.
-    #[schemars(range(min = 0.05, max = 1.0))]
-    pub wheel_half_separation_m: f64,
-    /// Standard deviation of a wheel's travel, as a fraction of it.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub wheel_slip: f64,
-    /// Speed limit of a wheel, m/s; of the middle of a base that is holonomic.
-    #[schemars(range(min = 0.05, max = 0.9))]
-    pub max_speed_mps: f64,
-    /// Kind of the base: "differential"; "holonomic", which drives and turns independently (it is not
-    /// driven sideways); or "ackermann", which steers like a car and does not turn on the spot.
-    pub base: Base,
-    /// Least radius of the turn of an "ackermann" base, at the middle of its driven axle, m.
-    #[schemars(range(min = 0.1, max = 20.0))]
-    pub min_turn_radius_m: f64,
-    /// Outline of the robot on the floor: corners in order around it, x forward and y left of the
-    /// point between its wheels, m (Nav2's `footprint`). With all that stands out, and what it carries.
-    pub footprint: Vec<[f64; 2]>,
-    /// Height of the robot with all that it carries, m.
-    #[schemars(range(min = 0.05, max = 3.0))]
-    pub height_m: f64,
-    /// Source of the robot's motion: "required", or "none" for a controller that is to drive without
-    /// odometry, as if the robot were always at rest.
-    pub odometry: OdometrySource,
-}
-
-impl Default for RobotSettings {
-    fn default() -> Self {
-        Self {
-            wheel_half_separation_m: 0.167,
-            wheel_slip: 0.02,
-            max_speed_mps: 0.9,
-            base: Base::Differential,
-            min_turn_radius_m: 0.5,
-            // An octagon around a disc of a radius of 0.25 m, somewhat more than the robot of P1.
-            footprint: vec![
-                [0.25, 0.1],
-                [0.25, -0.1],
-                [0.1, -0.25],
-                [-0.1, -0.25],
-                [-0.25, -0.1],
-                [-0.25, 0.1],
-                [-0.1, 0.25],
-                [0.1, 0.25],
-            ],
-            height_m: 1.4,
-            odometry: OdometrySource::Required,
-        }
+settings! {
+    /// Drive of the robot.
+    pub struct RobotSettings {
+        /// Half the distance between the driven wheels, m.
+        #[schemars(range(min = 0.05, max = 1.0))]
+        pub wheel_half_separation_m: f64 = 0.167,
+        /// Standard deviation of a wheel's travel, as a fraction of it.
+        #[schemars(range(min = 0.0, max = 1.0))]
+        pub wheel_slip: f64 = 0.02,
+        /// Speed limit of a wheel, m/s; of the middle of a base that is holonomic.
+        #[schemars(range(min = 0.05, max = 0.9))]
+        pub max_speed_mps: f64 = 0.9,
+        /// Kind of the base: "differential"; "holonomic", which drives and turns independently (it
+        /// is not driven sideways); or "ackermann", which steers like a car and does not turn on
+        /// the spot.
+        pub base: Base = Base::Differential,
+        /// Least radius of the turn of an "ackermann" base, at the middle of its driven axle, m.
+        #[schemars(range(min = 0.1, max = 20.0))]
+        pub min_turn_radius_m: f64 = 0.5,
+        /// Outline of the robot on the floor: corners in order around it, x forward and y left of
+        /// the point between its wheels, m (Nav2's `footprint`). With all that stands out, and what
+        /// it carries.
+        // An octagon around a disc of a radius of 0.25 m, somewhat more than the robot of P1.
+        pub footprint: Vec<[f64; 2]> = vec![
+            [0.25, 0.1],
+            [0.25, -0.1],
+            [0.1, -0.25],
+            [-0.1, -0.25],
+            [-0.25, -0.1],
+            [-0.25, 0.1],
+            [-0.1, 0.25],
+            [0.1, 0.25],
+        ],
+        /// Height of the robot with all that it carries, m.
+        #[schemars(range(min = 0.05, max = 3.0))]
+        pub height_m: f64 = 1.4,
+        /// Source of the robot's motion: "required", or "none" for a controller that is to drive
+        /// without odometry, as if the robot were always at rest.
+        pub odometry: OdometrySource = OdometrySource::Required,
     }
 }
 

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use tagalong_app::outcome::Failure;
 use tagalong_config::{FileLimit, read_text};
-use tagalong_geometry::{Camera, Distortion, Pinhole};
+use tagalong_geometry::{Camera, Pinhole};
 
 use super::args::{ImportArgs, MAX_HZ};
 use super::boxes;
@@ -105,6 +105,6 @@ fn of_files(args: &ImportArgs, files: Vec<PathBuf>, fps: f64) -> Result<Sequence
 /// Returns the pose of a camera at a height above the floor that looks ahead, and down by an angle.
 pub fn level(height_m: f64, down_deg: f64) -> nalgebra::Isometry3<f64> {
     // The lens does not matter for the pose; any valid one will do.
-    let lens = Pinhole { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0, distortion: Distortion::None };
-    Camera::mounted(lens, 1, 1, height_m, down_deg.to_radians(), 0.0).robot_from_camera
+    Camera::mounted(Pinhole::centred(1.0, 1, 1), 1, 1, height_m, down_deg.to_radians(), 0.0)
+        .robot_from_camera
 }

@@ -96,6 +96,16 @@ impl<
     /// Inputs of one output, which decide how large weights are at the start.
     pub const INPUTS: usize = SIZE * SIZE * IN;
 
+    /// Returns the weights and the biases.
+    pub fn parts(&self) -> [&[f32]; 2] {
+        [&self.weights, &self.bias]
+    }
+
+    /// Returns the weights and the biases, mutably.
+    pub fn parts_mut(&mut self) -> [&mut [f32]; 2] {
+        [&mut self.weights, &mut self.bias]
+    }
+
     /// Computes the sums, with those below zero cut off.
     #[inline(always)]
     pub fn forward(&self, input: &Map<IN>, out: &mut Map<OUT>) {

@@ -2,110 +2,81 @@ use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::Input;
+use tagalong_core::{Input, settings};
 
 use crate::camera_settings::{CameraSettings, MountSettings};
 use crate::obstacles::ObstacleTopic;
 
-/// Settings of the input from a log. Topics that are not named are found by message type and
-/// encoding.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct InputSettings {
-    /// Topic of the colour (or grey) images; of the left ones of a stereo pair.
-    pub colour_topic: Option<String>,
-    /// Topic of the depth images.
-    pub depth_topic: Option<String>,
-    /// Topic of the colour camera's calibration.
-    pub colour_info_topic: Option<String>,
-    /// Topic of the depth camera's calibration.
-    pub depth_info_topic: Option<String>,
-    /// Topic of the odometry; without one, tf from `odom_frame` to the robot is used.
-    pub odometry_topic: Option<String>,
-    /// Topic of a laser scanner's scans (`sensor_msgs` LaserScan), for detectors that use them and
-    /// for the command limiter of a steered robot.
-    pub laser_topic: Option<String>,
-    /// Topic of detections that another program recorded (`vision_msgs` Detection2DArray or
-    /// Detection3DArray), for `recorded-detections`.
-    pub detections_topic: Option<String>,
-    /// Classes of recorded detections that are people, by name or number; by default those with a
-    /// usual name (`person`, `pedestrian`, ...), the number 0, and detections without a class.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub detection_classes: Vec<String>,
-    /// Topics of further sensors, by the names of their inputs.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub topics: BTreeMap<String, String>,
-    /// Topic of the right images of a stereo pair.
-    pub right_topic: Option<String>,
-    /// Topic of the right camera's calibration, which holds the baseline.
-    pub right_info_topic: Option<String>,
-    /// Maximum difference between the stamps of images that belong together, s.
-    #[schemars(range(min = 0.0, max = 10.0))]
-    pub pair_tolerance_s: f64,
-    /// Robot frame: X forward, Y left, Z up, on the floor. If tf has `base_footprint` too, and this
-    /// is left at `base_link`, `base_footprint` is used.
-    pub base_frame: String,
-    /// Frame in which tf gives the robot's motion.
-    pub odom_frame: String,
-    /// Metres per unit of depth, if the log departs from the convention (millimetres for 16UC1,
-    /// metres for 32FC1); makes mono16 images depth.
-    #[schemars(range(min = 1e-6, max = 1e3))]
-    pub depth_unit_m: Option<f64>,
-    /// Makes the depth topic one of disparities: images without the geometry that
-    /// `stereo_msgs/DisparityImage` has, which needs no setting.
-    pub disparity: Option<DisparitySettings>,
-    /// Columns and rows by which depth images are shifted to lie on colour, if those of the log are
-    /// not registered well (`tagalong doctor` measures it).
-    #[schemars(inner(range(min = -1000, max = 1000)))]
-    pub depth_offset_px: [i32; 2],
-    /// Camera whose images are used, of several: the folder that its topics share. Or, as a table, the
-    /// pose of the camera, for logs without it in tf, or with a wrong one.
-    pub camera: Option<CameraSettings>,
-    /// Source of the times of messages.
-    pub stamps: StampSource,
-    /// Columns and rows to which the circular image of a conical mirror is unwrapped.
-    #[schemars(inner(range(min = 8, max = 8192)))]
-    pub panorama: [usize; 2],
-    /// Number of frames by which an image may be late and is still put in order.
-    #[schemars(range(max = 64))]
-    pub reorder_frames: usize,
-    /// Standard deviation of odometry as a fraction of the travel.
-    #[schemars(range(min = 0.0, max = 10.0))]
-    pub odometry_sigma: f64,
-    /// Further sources of obstacles. They are no keys under `[input]`: a program fills them in from
-    /// `[[collision_monitor.sources]]` of its pipeline.
-    #[serde(skip)]
-    #[schemars(skip)]
-    pub sources: Vec<ObstacleTopic>,
-}
-
-impl Default for InputSettings {
-    fn default() -> Self {
-        Self {
-            colour_topic: None,
-            depth_topic: None,
-            colour_info_topic: None,
-            depth_info_topic: None,
-            odometry_topic: None,
-            laser_topic: None,
-            detections_topic: None,
-            detection_classes: Vec::new(),
-            topics: BTreeMap::new(),
-            right_topic: None,
-            right_info_topic: None,
-            pair_tolerance_s: 0.03,
-            base_frame: "base_link".into(),
-            odom_frame: "odom".into(),
-            depth_unit_m: None,
-            disparity: None,
-            depth_offset_px: [0, 0],
-            camera: None,
-            stamps: StampSource::default(),
-            panorama: [480, 120],
-            reorder_frames: 3,
-            odometry_sigma: 0.02,
-            sources: Vec::new(),
-        }
+settings! {
+    /// Settings of the input from a log. Topics that are not named are found by message type and
+    /// encoding.
+    pub struct InputSettings {
+        /// Topic of the colour (or grey) images; of the left ones of a stereo pair.
+        pub colour_topic: Option<String>,
+        /// Topic of the depth images.
+        pub depth_topic: Option<String>,
+        /// Topic of the colour camera's calibration.
+        pub colour_info_topic: Option<String>,
+        /// Topic of the depth camera's calibration.
+        pub depth_info_topic: Option<String>,
+        /// Topic of the odometry; without one, tf from `odom_frame` to the robot is used.
+        pub odometry_topic: Option<String>,
+        /// Topic of a laser scanner's scans (`sensor_msgs` LaserScan), for detectors that use them
+        /// and for the command limiter of a steered robot.
+        pub laser_topic: Option<String>,
+        /// Topic of detections that another program recorded (`vision_msgs` Detection2DArray or
+        /// Detection3DArray), for `recorded-detections`.
+        pub detections_topic: Option<String>,
+        /// Classes of recorded detections that are people, by name or number; by default those with
+        /// a usual name (`person`, `pedestrian`, ...), the number 0, and detections without a
+        /// class.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pub detection_classes: Vec<String>,
+        /// Topics of further sensors, by the names of their inputs.
+        #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+        pub topics: BTreeMap<String, String> = BTreeMap::new(),
+        /// Topic of the right images of a stereo pair.
+        pub right_topic: Option<String>,
+        /// Topic of the right camera's calibration, which holds the baseline.
+        pub right_info_topic: Option<String>,
+        /// Maximum difference between the stamps of images that belong together, s.
+        #[schemars(range(min = 0.0, max = 10.0))]
+        pub pair_tolerance_s: f64 = 0.03,
+        /// Robot frame: X forward, Y left, Z up, on the floor. If tf has `base_footprint` too, and
+        /// this is left at `base_link`, `base_footprint` is used.
+        pub base_frame: String = "base_link".into(),
+        /// Frame in which tf gives the robot's motion.
+        pub odom_frame: String = "odom".into(),
+        /// Metres per unit of depth, if the log departs from the convention (millimetres for 16UC1,
+        /// metres for 32FC1); makes mono16 images depth.
+        #[schemars(range(min = 1e-6, max = 1e3))]
+        pub depth_unit_m: Option<f64>,
+        /// Makes the depth topic one of disparities: images without the geometry that
+        /// `stereo_msgs/DisparityImage` has, which needs no setting.
+        pub disparity: Option<DisparitySettings>,
+        /// Columns and rows by which depth images are shifted to lie on colour, if those of the log
+        /// are not registered well (`tagalong doctor` measures it).
+        #[schemars(inner(range(min = -1000, max = 1000)))]
+        pub depth_offset_px: [i32; 2] = [0, 0],
+        /// Camera whose images are used, of several: the folder that its topics share. Or, as a
+        /// table, the pose of the camera, for logs without it in tf, or with a wrong one.
+        pub camera: Option<CameraSettings>,
+        /// Source of the times of messages.
+        pub stamps: StampSource,
+        /// Columns and rows to which the circular image of a conical mirror is unwrapped.
+        #[schemars(inner(range(min = 8, max = 8192)))]
+        pub panorama: [usize; 2] = [480, 120],
+        /// Number of frames by which an image may be late and is still put in order.
+        #[schemars(range(max = 64))]
+        pub reorder_frames: usize = 3,
+        /// Standard deviation of odometry as a fraction of the travel.
+        #[schemars(range(min = 0.0, max = 10.0))]
+        pub odometry_sigma: f64 = 0.02,
+        /// Further sources of obstacles. They are no keys under `[input]`: a program fills them in
+        /// from `[[collision_monitor.sources]]` of its pipeline.
+        #[serde(skip)]
+        #[schemars(skip)]
+        pub sources: Vec<ObstacleTopic>,
     }
 }
 

@@ -3,6 +3,7 @@
 use nalgebra::{Isometry2, Point2, Point3, Rotation2, Rotation3, Vector2, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tagalong_core::settings;
 
 use crate::material::Material;
 use crate::obstacle::Obstacle;
@@ -24,49 +25,34 @@ const BEARING_STEP_DEG: f64 = 5.0;
 /// The body of a trolley is this far above the floor, on wheels, m.
 const WHEELS_M: f64 = 0.08;
 
-/// An approach: a person or a trolley appears near the robot and walks or rolls at it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct ApproachSettings {
-    /// Kind of the approacher.
-    pub by: ApproachBy,
-    /// Time at which it appears and sets out, s.
-    #[schemars(range(min = 0.0, max = 86_400.0))]
-    pub start_s: f64,
-    /// Direction from the robot to its start, degrees, from the robot's heading at that time to
-    /// the left. The nearest direction with enough room is taken where a wall is too near.
-    #[schemars(range(min = -360.0, max = 360.0))]
-    pub bearing_deg: f64,
-    /// Time in which it would reach a robot at rest, s: the speed times this is the distance of its
-    /// start, within 2 to 6 m.
-    #[schemars(range(min = 0.1, max = 60.0))]
-    pub lead_s: f64,
-    /// Speed, m/s.
-    #[schemars(range(min = 0.05, max = 2.0))]
-    pub speed_mps: f64,
-    /// It turns to the robot all the time; otherwise it keeps the direction in which the robot was
-    /// at the start.
-    pub aims: bool,
-    /// Body height of a person, m; by chance if left out.
-    #[schemars(range(min = 0.8, max = 2.2))]
-    pub height_m: Option<f64>,
-    /// Length, width and height of a trolley, m.
-    #[schemars(inner(range(min = 0.1, max = 2.0)))]
-    pub size_m: [f64; 3],
-}
-
-impl Default for ApproachSettings {
-    fn default() -> Self {
-        Self {
-            by: ApproachBy::Person,
-            start_s: 2.0,
-            bearing_deg: 0.0,
-            lead_s: 3.0,
-            speed_mps: 1.0,
-            aims: true,
-            height_m: None,
-            size_m: [0.7, 0.5, 1.0],
-        }
+settings! {
+    /// An approach: a person or a trolley appears near the robot and walks or rolls at it.
+    pub struct ApproachSettings {
+        /// Kind of the approacher.
+        pub by: ApproachBy = ApproachBy::Person,
+        /// Time at which it appears and sets out, s.
+        #[schemars(range(min = 0.0, max = 86_400.0))]
+        pub start_s: f64 = 2.0,
+        /// Direction from the robot to its start, degrees, from the robot's heading at that time to
+        /// the left. The nearest direction with enough room is taken where a wall is too near.
+        #[schemars(range(min = -360.0, max = 360.0))]
+        pub bearing_deg: f64 = 0.0,
+        /// Time in which it would reach a robot at rest, s: the speed times this is the distance of
+        /// its start, within 2 to 6 m.
+        #[schemars(range(min = 0.1, max = 60.0))]
+        pub lead_s: f64 = 3.0,
+        /// Speed, m/s.
+        #[schemars(range(min = 0.05, max = 2.0))]
+        pub speed_mps: f64 = 1.0,
+        /// It turns to the robot all the time; otherwise it keeps the direction in which the robot
+        /// was at the start.
+        pub aims: bool = true,
+        /// Body height of a person, m; by chance if left out.
+        #[schemars(range(min = 0.8, max = 2.2))]
+        pub height_m: Option<f64>,
+        /// Length, width and height of a trolley, m.
+        #[schemars(inner(range(min = 0.1, max = 2.0)))]
+        pub size_m: [f64; 3] = [0.7, 0.5, 1.0],
     }
 }
 

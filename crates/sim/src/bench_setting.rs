@@ -2,6 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tagalong_core::settings;
 
 use crate::crowd::Walk;
 
@@ -22,35 +23,24 @@ pub enum BenchSetting {
     Clutter,
 }
 
-/// Scene by the rules of Follow-Bench: it sets the room, the blocks, the people, and the start and the
-/// footprint of the robot. The first person is the target.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct FollowBench {
-    /// Layout.
-    pub setting: BenchSetting,
-    /// Number of people besides the target.
-    #[schemars(range(max = 40))]
-    pub people: usize,
-    /// Width of the corridor, the crossing or the doorway, m; that of the benchmark if left out.
-    #[schemars(range(min = 2.0, max = 10.0))]
-    pub width_m: Option<f64>,
-    /// Number of obstacles of the clutter.
-    #[schemars(range(max = 40))]
-    pub obstacles: usize,
-    /// Way of walking of all people.
-    pub walk: Walk,
-}
-
-impl Default for FollowBench {
-    fn default() -> Self {
-        Self {
-            setting: BenchSetting::Circular,
-            people: 10,
-            width_m: None,
-            obstacles: 20,
-            walk: Walk::Orca,
-        }
+settings! {
+    /// Scene by the rules of Follow-Bench: it sets the room, the blocks, the people, and the start
+    /// and the footprint of the robot. The first person is the target.
+    pub struct FollowBench {
+        /// Layout.
+        pub setting: BenchSetting = BenchSetting::Circular,
+        /// Number of people besides the target.
+        #[schemars(range(max = 40))]
+        pub people: usize = 10,
+        /// Width of the corridor, the crossing or the doorway, m; that of the benchmark if left
+        /// out.
+        #[schemars(range(min = 2.0, max = 10.0))]
+        pub width_m: Option<f64>,
+        /// Number of obstacles of the clutter.
+        #[schemars(range(max = 40))]
+        pub obstacles: usize = 20,
+        /// Way of walking of all people.
+        pub walk: Walk = Walk::Orca,
     }
 }
 

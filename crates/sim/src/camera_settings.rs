@@ -1,5 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tagalong_core::settings;
 
 use crate::mirror::MirrorSettings;
 
@@ -16,74 +17,51 @@ pub enum CameraKind {
     Panorama,
 }
 
-/// The camera on the robot. Where a scene leaves them out, width, height, field
-/// of view and baseline are those of the kind: 640x480, 58 degrees and 0.075 m
-/// of `rgbd`; 512x384, 100 degrees and 0.12 m of `stereo`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct CameraSettings {
-    /// Images that it delivers.
-    pub kind: CameraKind,
-    /// Without it an `rgbd` camera delivers depth only, and images are drawn
-    /// several times faster.
-    pub colour: bool,
-    /// Columns.
-    #[schemars(range(min = 8, max = 4096))]
-    pub width: usize,
-    /// Rows.
-    #[schemars(range(min = 8, max = 4096))]
-    pub height: usize,
-    /// Horizontal field of view, degrees.
-    #[schemars(range(min = 10.0, max = 150.0))]
-    pub field_of_view_deg: f64,
-    /// Images per second.
-    #[schemars(range(min = 0.1, max = 100.0))]
-    pub rate_hz: f64,
-    /// Height above the floor, m.
-    pub height_m: f64,
-    /// Looks this far down, degrees.
-    pub pitch_down_deg: f64,
-    /// Distance of the two cameras, or of camera and projector, m.
-    pub baseline_m: f64,
-    /// Nearest depth that is measured, m.
-    pub min_depth_m: f64,
-    /// Farthest depth that is measured, m.
-    pub max_depth_m: f64,
-    /// Exposure time, s.
-    pub exposure_s: f64,
-    /// From the first row to the last, s; 0 takes all rows at once. The stamp is
-    /// that of the middle row, and people stand still meanwhile. Not for mirrors.
-    #[schemars(range(min = 0.0, max = 0.05))]
-    pub rolling_shutter_s: f64,
-    /// The depth of an `rgbd` camera with colour is taken this much later than
-    /// the colour, s; its stamp says so.
-    #[schemars(range(min = 0.0, max = 0.02))]
-    pub depth_offset_s: f64,
-    /// Typical error of the mount as stated in the log, degrees and (in hundredths) metres.
-    pub mount_error_deg: f64,
-    /// The mirror of a panorama camera.
-    pub mirror: MirrorSettings,
-}
-
-impl Default for CameraSettings {
-    fn default() -> Self {
-        Self {
-            kind: CameraKind::Rgbd,
-            colour: true,
-            width: 640,
-            height: 480,
-            field_of_view_deg: 58.0,
-            rate_hz: 10.0,
-            height_m: 1.2,
-            pitch_down_deg: 0.0,
-            baseline_m: 0.075,
-            min_depth_m: 0.5,
-            max_depth_m: 8.0,
-            exposure_s: 0.012,
-            rolling_shutter_s: 0.0,
-            depth_offset_s: 0.0,
-            mount_error_deg: 0.4,
-            mirror: MirrorSettings::default(),
-        }
+settings! {
+    /// The camera on the robot. Where a scene leaves them out, width, height, field
+    /// of view and baseline are those of the kind: 640x480, 58 degrees and 0.075 m
+    /// of `rgbd`; 512x384, 100 degrees and 0.12 m of `stereo`.
+    pub struct CameraSettings {
+        /// Images that it delivers.
+        pub kind: CameraKind = CameraKind::Rgbd,
+        /// Without it an `rgbd` camera delivers depth only, and images are drawn
+        /// several times faster.
+        pub colour: bool = true,
+        /// Columns.
+        #[schemars(range(min = 8, max = 4096))]
+        pub width: usize = 640,
+        /// Rows.
+        #[schemars(range(min = 8, max = 4096))]
+        pub height: usize = 480,
+        /// Horizontal field of view, degrees.
+        #[schemars(range(min = 10.0, max = 150.0))]
+        pub field_of_view_deg: f64 = 58.0,
+        /// Images per second.
+        #[schemars(range(min = 0.1, max = 100.0))]
+        pub rate_hz: f64 = 10.0,
+        /// Height above the floor, m.
+        pub height_m: f64 = 1.2,
+        /// Looks this far down, degrees.
+        pub pitch_down_deg: f64 = 0.0,
+        /// Distance of the two cameras, or of camera and projector, m.
+        pub baseline_m: f64 = 0.075,
+        /// Nearest depth that is measured, m.
+        pub min_depth_m: f64 = 0.5,
+        /// Farthest depth that is measured, m.
+        pub max_depth_m: f64 = 8.0,
+        /// Exposure time, s.
+        pub exposure_s: f64 = 0.012,
+        /// From the first row to the last, s; 0 takes all rows at once. The stamp is
+        /// that of the middle row, and people stand still meanwhile. Not for mirrors.
+        #[schemars(range(min = 0.0, max = 0.05))]
+        pub rolling_shutter_s: f64 = 0.0,
+        /// The depth of an `rgbd` camera with colour is taken this much later than
+        /// the colour, s; its stamp says so.
+        #[schemars(range(min = 0.0, max = 0.02))]
+        pub depth_offset_s: f64 = 0.0,
+        /// Typical error of the mount as stated in the log, degrees and (in hundredths) metres.
+        pub mount_error_deg: f64 = 0.4,
+        /// The mirror of a panorama camera.
+        pub mirror: MirrorSettings,
     }
 }

@@ -1,8 +1,7 @@
 //! Windows, the sky in them, and the sun.
 
 use nalgebra::{Point3, Rotation3, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use tagalong_core::settings;
 
 use crate::material::Material;
 use crate::room_settings::RoomSettings;
@@ -18,38 +17,26 @@ const LEAST_PITCH_M: f64 = 1.6;
 /// Distance of the sun, m: far enough for parallel beams.
 const SUN_M: f64 = 1000.0;
 
-/// Windows along the left wall of a room (at the far end of Y), evenly spread, and the light of
-/// the day in them. They shine in a camera's face, and where the sun falls images are white and
-/// structured light measures nothing.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Daylight {
-    /// Number of windows.
-    pub windows: usize,
-    /// Brightness of the sky in them, as the illuminance of a white surface, lx.
-    #[schemars(range(min = 0.0, max = 50_000.0))]
-    pub sky_lux: f64,
-    /// Illuminance of a surface that faces the sun, lx; 0 is an overcast day.
-    #[schemars(range(min = 0.0, max = 130_000.0))]
-    pub sun_lux: f64,
-    /// Direction of the sun from straight out of the windows towards the far end of the room,
-    /// degrees.
-    #[schemars(range(min = -80.0, max = 80.0))]
-    pub azimuth_deg: f64,
-    /// Height of the sun above the horizon, degrees.
-    #[schemars(range(min = 2.0, max = 80.0))]
-    pub elevation_deg: f64,
-}
-
-impl Default for Daylight {
-    fn default() -> Self {
-        Self {
-            windows: 3,
-            sky_lux: 3000.0,
-            sun_lux: 20_000.0,
-            azimuth_deg: 20.0,
-            elevation_deg: 30.0,
-        }
+settings! {
+    /// Windows along the left wall of a room (at the far end of Y), evenly spread, and the light of
+    /// the day in them. They shine in a camera's face, and where the sun falls images are white and
+    /// structured light measures nothing.
+    pub struct Daylight {
+        /// Number of windows.
+        pub windows: usize = 3,
+        /// Brightness of the sky in them, as the illuminance of a white surface, lx.
+        #[schemars(range(min = 0.0, max = 50_000.0))]
+        pub sky_lux: f64 = 3000.0,
+        /// Illuminance of a surface that faces the sun, lx; 0 is an overcast day.
+        #[schemars(range(min = 0.0, max = 130_000.0))]
+        pub sun_lux: f64 = 20_000.0,
+        /// Direction of the sun from straight out of the windows towards the far end of the room,
+        /// degrees.
+        #[schemars(range(min = -80.0, max = 80.0))]
+        pub azimuth_deg: f64 = 20.0,
+        /// Height of the sun above the horizon, degrees.
+        #[schemars(range(min = 2.0, max = 80.0))]
+        pub elevation_deg: f64 = 30.0,
     }
 }
 

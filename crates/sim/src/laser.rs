@@ -3,10 +3,8 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-use tagalong_core::LaserScan;
+use tagalong_core::{LaserScan, settings};
 
 use crate::random::normal_at;
 use crate::world::{self, Object, World};
@@ -14,46 +12,32 @@ use crate::world::{self, Object, World};
 /// So many rays must meet an object that counts as seen.
 const LEAST_RAYS: usize = 2;
 
-/// A laser scanner on the robot, above the point between its wheels. It looks
-/// whenever the camera does.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct LaserSettings {
-    /// Rays in a scan.
-    #[schemars(range(min = 2, max = 4096))]
-    pub rays: usize,
-    /// Around the direction ahead, degrees; 360 is all around.
-    #[schemars(range(min = 10.0, max = 360.0))]
-    pub field_of_view_deg: f64,
-    /// Height above the floor, m.
-    #[schemars(range(min = 0.02, max = 2.0))]
-    pub height_m: f64,
-    /// Nearest range that is measured, m.
-    #[schemars(range(min = 0.0))]
-    pub min_range_m: f64,
-    /// Farthest range that is measured, m.
-    #[schemars(range(max = 100.0))]
-    pub max_range_m: f64,
-    /// Standard deviation of a range, m.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub sigma_m: f64,
-    /// Standard deviation that grows with the range, m per m, beside `sigma_m`: cheap scanners find the
-    /// range by the angle of a spot, and have 0.005, which is 2 cm at 4 m.
-    #[schemars(range(min = 0.0, max = 0.2))]
-    pub sigma_per_m: f64,
-}
-
-impl Default for LaserSettings {
-    fn default() -> Self {
-        Self {
-            rays: 360,
-            field_of_view_deg: 360.0,
-            height_m: 0.2,
-            min_range_m: 0.12,
-            max_range_m: 8.0,
-            sigma_m: 0.01,
-            sigma_per_m: 0.0,
-        }
+settings! {
+    /// A laser scanner on the robot, above the point between its wheels. It looks
+    /// whenever the camera does.
+    pub struct LaserSettings {
+        /// Rays in a scan.
+        #[schemars(range(min = 2, max = 4096))]
+        pub rays: usize = 360,
+        /// Around the direction ahead, degrees; 360 is all around.
+        #[schemars(range(min = 10.0, max = 360.0))]
+        pub field_of_view_deg: f64 = 360.0,
+        /// Height above the floor, m.
+        #[schemars(range(min = 0.02, max = 2.0))]
+        pub height_m: f64 = 0.2,
+        /// Nearest range that is measured, m.
+        #[schemars(range(min = 0.0))]
+        pub min_range_m: f64 = 0.12,
+        /// Farthest range that is measured, m.
+        #[schemars(range(max = 100.0))]
+        pub max_range_m: f64 = 8.0,
+        /// Standard deviation of a range, m.
+        #[schemars(range(min = 0.0, max = 1.0))]
+        pub sigma_m: f64 = 0.01,
+        /// Standard deviation that grows with the range, m per m, beside `sigma_m`: cheap scanners
+        /// find the range by the angle of a spot, and have 0.005, which is 2 cm at 4 m.
+        #[schemars(range(min = 0.0, max = 0.2))]
+        pub sigma_per_m: f64 = 0.0,
     }
 }
 

@@ -5,45 +5,45 @@ use std::f64::consts::TAU;
 use nalgebra::{Isometry3, Point3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::PointCloud;
+use tagalong_core::{PointCloud, settings};
 
 use crate::random::normal_at;
 use crate::world::World;
 
-/// A 3-D lidar on the robot, above the point between its wheels, level. It looks whenever the camera
-/// does.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct LidarSettings {
-    /// Order of the beams.
-    pub pattern: BeamPattern,
-    /// Beams in a cloud.
-    #[schemars(range(max = 200_000))]
-    pub beams: usize,
-    /// Rings of a spinning lidar.
-    #[schemars(range(min = 1, max = 128))]
-    pub rings: usize,
-    /// Around the direction ahead, degrees; 360 is all around.
-    #[schemars(range(min = 10.0, max = 360.0))]
-    pub field_of_view_deg: f64,
-    /// Lowest beams above the horizon, degrees ...
-    #[schemars(range(min = -90.0))]
-    pub lowest_deg: f64,
-    /// ... and the highest ones, degrees.
-    #[schemars(range(max = 90.0))]
-    pub highest_deg: f64,
-    /// Height above the floor, m.
-    #[schemars(range(min = 0.02, max = 3.0))]
-    pub height_m: f64,
-    /// Nearest range that is measured, m.
-    #[schemars(range(min = 0.0))]
-    pub min_range_m: f64,
-    /// Farthest range that is measured, m.
-    #[schemars(range(max = 200.0))]
-    pub max_range_m: f64,
-    /// Standard deviation of a range, m.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub sigma_m: f64,
+settings! {
+    /// A 3-D lidar on the robot, above the point between its wheels, level. It looks whenever the
+    /// camera does.
+    pub struct LidarSettings {
+        /// Order of the beams.
+        pub pattern: BeamPattern = BeamPattern::Rings,
+        /// Beams in a cloud.
+        #[schemars(range(max = 200_000))]
+        pub beams: usize = 14_400,
+        /// Rings of a spinning lidar.
+        #[schemars(range(min = 1, max = 128))]
+        pub rings: usize = 16,
+        /// Around the direction ahead, degrees; 360 is all around.
+        #[schemars(range(min = 10.0, max = 360.0))]
+        pub field_of_view_deg: f64 = 360.0,
+        /// Lowest beams above the horizon, degrees ...
+        #[schemars(range(min = -90.0))]
+        pub lowest_deg: f64 = -15.0,
+        /// ... and the highest ones, degrees.
+        #[schemars(range(max = 90.0))]
+        pub highest_deg: f64 = 15.0,
+        /// Height above the floor, m.
+        #[schemars(range(min = 0.02, max = 3.0))]
+        pub height_m: f64 = 0.8,
+        /// Nearest range that is measured, m.
+        #[schemars(range(min = 0.0))]
+        pub min_range_m: f64 = 0.3,
+        /// Farthest range that is measured, m.
+        #[schemars(range(max = 200.0))]
+        pub max_range_m: f64 = 30.0,
+        /// Standard deviation of a range, m.
+        #[schemars(range(min = 0.0, max = 1.0))]
+        pub sigma_m: f64 = 0.02,
+    }
 }
 
 /// Order of the beams of a lidar.
@@ -55,23 +55,6 @@ pub enum BeamPattern {
     /// Two turning prisms, as in solid-state lidars: a rosette whose petals are elsewhere in each
     /// cloud.
     Rosette,
-}
-
-impl Default for LidarSettings {
-    fn default() -> Self {
-        Self {
-            pattern: BeamPattern::Rings,
-            beams: 14_400,
-            rings: 16,
-            field_of_view_deg: 360.0,
-            lowest_deg: -15.0,
-            highest_deg: 15.0,
-            height_m: 0.8,
-            min_range_m: 0.3,
-            max_range_m: 30.0,
-            sigma_m: 0.02,
-        }
-    }
 }
 
 /// Turns of the two prisms in a cloud. They have no small common multiple with each other, or the

@@ -2,8 +2,7 @@
 //! the mirror hangs a little askew.
 
 use nalgebra::{Isometry3, Point2, Point3, UnitQuaternion, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use tagalong_core::settings;
 use tagalong_geometry::{Camera, ConicalMirror, Distortion, Lens, Panorama, Pinhole, Rect};
 
 use crate::camera_settings::CameraSettings;
@@ -20,46 +19,31 @@ const TILE: usize = LANES;
 /// The mirror fills the image up to this part of half its smaller side.
 const FILLED: f64 = 0.97;
 
-/// The mirror of a panorama camera.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct MirrorSettings {
-    /// Between the axis and the surface, degrees.
-    #[schemars(range(min = 50.0, max = 85.0))]
-    pub half_angle_deg: f64,
-    /// Height of the apex above the pinhole, m.
-    #[schemars(range(min = 0.005, max = 1.0))]
-    pub apex_m: f64,
-    /// Smallest and largest angle from the axis that the log calls useful,
-    /// degrees; the rim of the mirror is at the larger one. An angle `phi` looks
-    /// `2 * half_angle_deg - 90 - phi` degrees below the horizon.
-    pub view_deg: [f64; 2],
-    /// Columns and rows of the unwrapped panorama in which the truth gives regions.
-    #[schemars(inner(range(min = 8, max = 4096)))]
-    pub panorama: [usize; 2],
-    /// Where the axis is seen, from the middle of the image, pixels; the log knows it.
-    pub centre_px: [f64; 2],
-    /// Standard deviation of the log's mistake about that, pixels.
-    pub centre_error_px: f64,
-    /// Standard deviation of the log's mistake about `half_angle_deg`, degrees.
-    pub angle_error_deg: f64,
-    /// Standard deviation of the tilt of the mirror against the camera, degrees;
-    /// the log does not know it.
-    pub tilt_error_deg: f64,
-}
-
-impl Default for MirrorSettings {
-    fn default() -> Self {
-        Self {
-            half_angle_deg: 67.5,
-            apex_m: 0.05,
-            view_deg: [2.0, 53.0],
-            panorama: [480, 120],
-            centre_px: [0.0, 0.0],
-            centre_error_px: 0.3,
-            angle_error_deg: 0.1,
-            tilt_error_deg: 0.2,
-        }
+settings! {
+    /// The mirror of a panorama camera.
+    pub struct MirrorSettings {
+        /// Between the axis and the surface, degrees.
+        #[schemars(range(min = 50.0, max = 85.0))]
+        pub half_angle_deg: f64 = 67.5,
+        /// Height of the apex above the pinhole, m.
+        #[schemars(range(min = 0.005, max = 1.0))]
+        pub apex_m: f64 = 0.05,
+        /// Smallest and largest angle from the axis that the log calls useful,
+        /// degrees; the rim of the mirror is at the larger one. An angle `phi` looks
+        /// `2 * half_angle_deg - 90 - phi` degrees below the horizon.
+        pub view_deg: [f64; 2] = [2.0, 53.0],
+        /// Columns and rows of the unwrapped panorama in which the truth gives regions.
+        #[schemars(inner(range(min = 8, max = 4096)))]
+        pub panorama: [usize; 2] = [480, 120],
+        /// Where the axis is seen, from the middle of the image, pixels; the log knows it.
+        pub centre_px: [f64; 2] = [0.0, 0.0],
+        /// Standard deviation of the log's mistake about that, pixels.
+        pub centre_error_px: f64 = 0.3,
+        /// Standard deviation of the log's mistake about `half_angle_deg`, degrees.
+        pub angle_error_deg: f64 = 0.1,
+        /// Standard deviation of the tilt of the mirror against the camera, degrees;
+        /// the log does not know it.
+        pub tilt_error_deg: f64 = 0.2,
     }
 }
 

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{LaserScan, RangeReading};
+use tagalong_core::{LaserScan, RangeReading, settings};
 use tagalong_math::{fingerprint, number_at};
 
 use crate::laser::LaserSettings;
@@ -32,58 +32,38 @@ pub enum RangeKind {
     Infrared,
 }
 
-/// A range sensor on the robot: the distance to the nearest surface within a cone.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct RangeSettings {
-    /// Name, as that of its source in `[[collision_monitor.sources]]`.
-    pub name: String,
-    /// Kind of the sensor.
-    pub kind: RangeKind,
-    /// Place on the robot: forward, to the left and up, m, and the direction, degrees to the left.
-    pub mount: [f64; 4],
-    /// Angle of the cone, degrees.
-    pub field_of_view_deg: f64,
-    /// Nearest distance that is measured, m.
-    pub min_range_m: f64,
-    /// Farthest distance that is measured, m.
-    pub max_range_m: f64,
-    /// Standard deviation of a distance, m.
-    pub sigma_m: f64,
-    /// Readings per second.
-    pub rate_hz: f64,
-}
-
-impl Default for RangeSettings {
-    fn default() -> Self {
-        Self {
-            name: String::new(),
-            kind: RangeKind::Sonar,
-            mount: [0.2, 0.0, 0.25, 0.0],
-            field_of_view_deg: 30.0,
-            min_range_m: 0.05,
-            max_range_m: 4.0,
-            sigma_m: 0.01,
-            rate_hz: 10.0,
-        }
+settings! {
+    /// A range sensor on the robot: the distance to the nearest surface within a cone.
+    pub struct RangeSettings {
+        /// Name, as that of its source in `[[collision_monitor.sources]]`.
+        pub name: String,
+        /// Kind of the sensor.
+        pub kind: RangeKind = RangeKind::Sonar,
+        /// Place on the robot: forward, to the left and up, m, and the direction, degrees to the
+        /// left.
+        pub mount: [f64; 4] = [0.2, 0.0, 0.25, 0.0],
+        /// Angle of the cone, degrees.
+        pub field_of_view_deg: f64 = 30.0,
+        /// Nearest distance that is measured, m.
+        pub min_range_m: f64 = 0.05,
+        /// Farthest distance that is measured, m.
+        pub max_range_m: f64 = 4.0,
+        /// Standard deviation of a distance, m.
+        pub sigma_m: f64 = 0.01,
+        /// Readings per second.
+        pub rate_hz: f64 = 10.0,
     }
 }
 
-/// A bumper on the robot: pressed while the robot touches something within an arc.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct BumperSettings {
-    /// Name, as that of its source in `[[collision_monitor.sources]]`.
-    pub name: String,
-    /// Directions that it covers, degrees to the left, from the right end to the left one.
-    pub arc_deg: [f64; 2],
-    /// Readings per second.
-    pub rate_hz: f64,
-}
-
-impl Default for BumperSettings {
-    fn default() -> Self {
-        Self { name: String::new(), arc_deg: [-90.0, 90.0], rate_hz: 50.0 }
+settings! {
+    /// A bumper on the robot: pressed while the robot touches something within an arc.
+    pub struct BumperSettings {
+        /// Name, as that of its source in `[[collision_monitor.sources]]`.
+        pub name: String,
+        /// Directions that it covers, degrees to the left, from the right end to the left one.
+        pub arc_deg: [f64; 2] = [-90.0, 90.0],
+        /// Readings per second.
+        pub rate_hz: f64 = 50.0,
     }
 }
 

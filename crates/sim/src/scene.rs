@@ -7,6 +7,7 @@ use crate::room_settings::RoomSettings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_config::{ConfigError, check_settings};
+use tagalong_core::settings;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
 
@@ -26,94 +27,66 @@ use crate::split::{SUBJECTS, Split};
 use crate::variation::{Variant, one_scene};
 use crate::webcam::WebcamSettings;
 
-/// A scene. Lengths are in metres; the room's corner is the origin, X runs
-/// along its length, Y along its width; angles turn from X towards Y.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Scene {
-    /// Purpose of the scene.
-    pub about: String,
-    /// Seed of all random numbers; it also decides for which purpose the log may be used, see
-    /// [`Split`].
-    pub seed: u64,
-    /// Length of the log, s.
-    #[schemars(range(min = 1e-6, max = 86_400.0))]
-    pub duration_s: f64,
-    /// Wanderers with random looks and ways, besides `people`.
-    pub crowd: usize,
-    /// The room.
-    pub room: RoomSettings,
-    /// The light.
-    pub light: LightSettings,
-    /// The camera.
-    pub camera: CameraSettings,
-    /// The robot.
-    pub robot: RobotSettings,
-    /// Faults on the way into the log.
-    pub faults: FaultSettings,
-    /// A laser scanner on the robot, if it has one; `laser = {}` is an ordinary one.
-    pub laser: Option<LaserSettings>,
-    /// A 3-D lidar on the robot, if it has one; `lidar = {}` is a spinning one of 16 rings.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub lidar: Option<LidarSettings>,
-    /// Further laser scanners, as sources of obstacles.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub lasers: Vec<ScannerSettings>,
-    /// Sonars and infrared sensors.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub ranges: Vec<RangeSettings>,
-    /// Bumpers.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub bumpers: Vec<BumperSettings>,
-    /// Cameras that hang in the room.
-    pub webcams: Vec<WebcamSettings>,
-    /// Furniture.
-    pub furniture: Vec<Furniture>,
-    /// Blocks of wall, which people with a walk other than `plain` find ways around.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    #[schemars(length(max = 500))]
-    pub blocks: Vec<Block>,
-    /// People.
-    pub people: Vec<PersonSettings>,
-    /// Settings of people with a walk other than `plain`.
-    #[serde(skip_serializing_if = "CrowdSettings::is_default")]
-    pub reacting: CrowdSettings,
-    /// A person or a trolley that comes at the robot; none if left out.
-    pub approach: Option<ApproachSettings>,
-    /// Room, blocks and people by the rules of the benchmark Follow-Bench.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub follow_bench: Option<FollowBench>,
-    /// Variation of the path of the first person by the seed; without it the path is the same for all.
-    #[serde(skip_serializing_if = "PathVariation::is_off")]
-    pub variation: PathVariation,
-}
-
-impl Default for Scene {
-    fn default() -> Self {
-        Self {
-            about: String::new(),
-            seed: 1,
-            duration_s: 10.0,
-            crowd: 0,
-            room: RoomSettings::default(),
-            light: LightSettings::default(),
-            camera: CameraSettings::default(),
-            robot: RobotSettings::default(),
-            faults: FaultSettings::default(),
-            laser: None,
-            lidar: None,
-            lasers: Vec::new(),
-            ranges: Vec::new(),
-            bumpers: Vec::new(),
-            webcams: Vec::new(),
-            furniture: Vec::new(),
-            blocks: Vec::new(),
-            people: Vec::new(),
-            reacting: CrowdSettings::default(),
-            approach: None,
-            follow_bench: None,
-            variation: PathVariation::default(),
-        }
+settings! {
+    /// A scene. Lengths are in metres; the room's corner is the origin, X runs
+    /// along its length, Y along its width; angles turn from X towards Y.
+    pub struct Scene {
+        /// Purpose of the scene.
+        pub about: String,
+        /// Seed of all random numbers; it also decides for which purpose the log may be used, see
+        /// [`Split`].
+        pub seed: u64 = 1,
+        /// Length of the log, s.
+        #[schemars(range(min = 1e-6, max = 86_400.0))]
+        pub duration_s: f64 = 10.0,
+        /// Wanderers with random looks and ways, besides `people`.
+        pub crowd: usize = 0,
+        /// The room.
+        pub room: RoomSettings,
+        /// The light.
+        pub light: LightSettings,
+        /// The camera.
+        pub camera: CameraSettings,
+        /// The robot.
+        pub robot: RobotSettings,
+        /// Faults on the way into the log.
+        pub faults: FaultSettings,
+        /// A laser scanner on the robot, if it has one; `laser = {}` is an ordinary one.
+        pub laser: Option<LaserSettings>,
+        /// A 3-D lidar on the robot, if it has one; `lidar = {}` is a spinning one of 16 rings.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub lidar: Option<LidarSettings>,
+        /// Further laser scanners, as sources of obstacles.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pub lasers: Vec<ScannerSettings>,
+        /// Sonars and infrared sensors.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pub ranges: Vec<RangeSettings>,
+        /// Bumpers.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pub bumpers: Vec<BumperSettings>,
+        /// Cameras that hang in the room.
+        pub webcams: Vec<WebcamSettings>,
+        /// Furniture.
+        pub furniture: Vec<Furniture>,
+        /// Blocks of wall, which people with a walk other than `plain` find ways around.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        #[schemars(length(max = 500))]
+        pub blocks: Vec<Block>,
+        /// People.
+        pub people: Vec<PersonSettings>,
+        /// Settings of people with a walk other than `plain`.
+        #[serde(skip_serializing_if = "CrowdSettings::is_default")]
+        pub reacting: CrowdSettings,
+        /// A person or a trolley that comes at the robot; none if left out.
+        pub approach: Option<ApproachSettings>,
+        /// Room, blocks and people by the rules of the benchmark Follow-Bench.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub follow_bench: Option<FollowBench>,
+        /// Variation of the path of the first person by the seed; without it the path is the same
+        /// for all.
+        #[serde(skip_serializing_if = "PathVariation::is_off")]
+        pub variation: PathVariation,
     }
 }
 
@@ -263,101 +236,69 @@ fn complete_camera(root: &mut DeTable<'_>) {
     }
 }
 
-/// The light.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct LightSettings {
-    /// Illuminance of the floor below a lamp, lx.
-    pub lux: f64,
-    /// Lamps along the room.
-    pub lamps: usize,
-    /// Light from everywhere as a fraction of `lux`.
-    pub ambient: f64,
-    /// Windows and the sun; without it the room has no windows.
-    pub day: Option<Daylight>,
-}
-
-impl Default for LightSettings {
-    fn default() -> Self {
-        Self { lux: 350.0, lamps: 2, ambient: 0.35, day: None }
+settings! {
+    /// The light.
+    pub struct LightSettings {
+        /// Illuminance of the floor below a lamp, lx.
+        pub lux: f64 = 350.0,
+        /// Lamps along the room.
+        pub lamps: usize = 2,
+        /// Light from everywhere as a fraction of `lux`.
+        pub ambient: f64 = 0.35,
+        /// Windows and the sun; without it the room has no windows.
+        pub day: Option<Daylight>,
     }
 }
 
-/// The robot and its way.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct RobotSettings {
-    /// Where it starts, m.
-    pub start: [f64; 2],
-    /// Where it looks at the start, degrees.
-    pub heading_deg: f64,
-    /// Corners of its outline, robot frame, m; left out, it is a disc with a radius of 0.25 m.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub footprint: Vec<[f64; 2]>,
-    /// Points that it drives to one after the other; none is a robot at rest.
-    pub path: Vec<[f64; 2]>,
-    /// Comes after the first person of the scene and stays this far away, m, whatever the
-    /// path; 0 keeps to the path.
-    #[schemars(range(min = 0.0, max = 20.0))]
-    pub behind_m: f64,
-    /// Speed, m/s.
-    pub speed_mps: f64,
-    /// Half the distance between the wheels, m.
-    pub half_separation_m: f64,
-    /// Radius of the wheels, as the odometry believes, m.
-    #[schemars(range(min = 0.005, max = 1.0))]
-    pub wheel_radius_m: f64,
-    /// Ticks of an encoder in one turn of its wheel.
-    #[schemars(range(min = 1))]
-    pub ticks_per_turn: u32,
-    /// Time constant of the wheel speeds, s.
-    pub response_s: f64,
-    /// From a command to its effect, s.
-    pub latency_s: f64,
-    /// Standard deviation of the radius of each wheel and of their distance as
-    /// fractions; unknown to the odometry.
-    pub wheel_bias: f64,
-    /// Standard deviation of a wheel's slip as a fraction of its travel in one
-    /// step of the odometry.
-    pub slip: f64,
-}
-
-impl Default for RobotSettings {
-    fn default() -> Self {
-        Self {
-            start: [1.0, 3.0],
-            heading_deg: 0.0,
-            footprint: Vec::new(),
-            path: Vec::new(),
-            behind_m: 0.0,
-            speed_mps: 0.5,
-            half_separation_m: 0.167,
-            wheel_radius_m: 0.0975,
-            ticks_per_turn: 4096,
-            response_s: 0.2,
-            latency_s: 0.1,
-            wheel_bias: 0.005,
-            slip: 0.02,
-        }
+settings! {
+    /// The robot and its way.
+    pub struct RobotSettings {
+        /// Where it starts, m.
+        pub start: [f64; 2] = [1.0, 3.0],
+        /// Where it looks at the start, degrees.
+        pub heading_deg: f64 = 0.0,
+        /// Corners of its outline, robot frame, m; left out, it is a disc with a radius of 0.25 m.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pub footprint: Vec<[f64; 2]>,
+        /// Points that it drives to one after the other; none is a robot at rest.
+        pub path: Vec<[f64; 2]>,
+        /// Comes after the first person of the scene and stays this far away, m, whatever the
+        /// path; 0 keeps to the path.
+        #[schemars(range(min = 0.0, max = 20.0))]
+        pub behind_m: f64 = 0.0,
+        /// Speed, m/s.
+        pub speed_mps: f64 = 0.5,
+        /// Half the distance between the wheels, m.
+        pub half_separation_m: f64 = 0.167,
+        /// Radius of the wheels, as the odometry believes, m.
+        #[schemars(range(min = 0.005, max = 1.0))]
+        pub wheel_radius_m: f64 = 0.0975,
+        /// Ticks of an encoder in one turn of its wheel.
+        #[schemars(range(min = 1))]
+        pub ticks_per_turn: u32 = 4096,
+        /// Time constant of the wheel speeds, s.
+        pub response_s: f64 = 0.2,
+        /// From a command to its effect, s.
+        pub latency_s: f64 = 0.1,
+        /// Standard deviation of the radius of each wheel and of their distance as
+        /// fractions; unknown to the odometry.
+        pub wheel_bias: f64 = 0.005,
+        /// Standard deviation of a wheel's slip as a fraction of its travel in one
+        /// step of the odometry.
+        pub slip: f64 = 0.02,
     }
 }
 
-/// Faults on the way into the log.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct FaultSettings {
-    /// Fraction of images that never arrive.
-    pub dropped: f64,
-    /// Fraction of images that are recorded late, up to 0.15 s.
-    pub late: f64,
-    /// Faults that begin at a time.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub inject: Vec<InjectedFault>,
-}
-
-impl Default for FaultSettings {
-    fn default() -> Self {
-        Self { dropped: 0.01, late: 0.02, inject: Vec::new() }
+settings! {
+    /// Faults on the way into the log.
+    pub struct FaultSettings {
+        /// Fraction of images that never arrive.
+        pub dropped: f64 = 0.01,
+        /// Fraction of images that are recorded late, up to 0.15 s.
+        pub late: f64 = 0.02,
+        /// Faults that begin at a time.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pub inject: Vec<InjectedFault>,
     }
 }
 
@@ -389,85 +330,58 @@ pub enum AtEnd {
     Loop,
 }
 
-/// A person.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct PersonSettings {
-    /// Points to walk through; the first is where they start.
-    pub path: Vec<[f64; 2]>,
-    /// Number of points that follow the path, which the seed chooses: anywhere in the
-    /// room, off furniture and the robot's start.
-    #[schemars(range(max = 1000))]
-    pub wander: usize,
-    /// Way of walking.
-    #[serde(skip_serializing_if = "Walk::is_plain")]
-    pub walk: Walk,
-    /// Preferred speed, m/s.
-    #[schemars(range(min = 0.0, max = 2.0))]
-    pub speed_mps: f64,
-    /// Stands until then, s.
-    pub start_s: f64,
-    /// Rests at the points of the path for this long on every visit, s; none where
-    /// the list ends.
-    #[schemars(inner(range(min = 0.0, max = 3600.0)))]
-    pub rest_s: Vec<f64>,
-    /// Time before which the person is not in the room, s: a detector that learns the appearance of
-    /// the empty room needs to see it.
-    pub enters_s: f64,
-    /// End of the stay in the room, s; none if left out.
-    pub leaves_s: Option<f64>,
-    /// Behaviour at the end of the path.
-    pub at_end: AtEnd,
-    /// Behaviour when hidden.
-    pub trick: Trick,
-    /// For how long the trick `stop` stays hidden, s.
-    pub hide_s: f64,
-    /// The whole path is shifted by this, m.
-    pub offset: [f64; 2],
-    /// Posture.
-    pub posture: Posture,
-    /// Number of others that walk along, 0.6 to 1 m apart; they count as people of their own.
-    #[schemars(range(max = 3))]
-    pub companions: usize,
-    /// Direction of the face at the start, degrees; the way ahead if left out.
-    pub heading_deg: Option<f64>,
-    /// Turns on the spot, degrees per second.
-    pub spin_deg_per_s: f64,
-    /// Body height, m; by chance if left out.
-    pub height_m: Option<f64>,
-    /// Number in the pool of people that the seed's split has, 0 to 499; by
-    /// chance if left out.
-    pub subject: Option<u64>,
-    /// In the clothes of this number of the pool; in their own if left out.
-    pub look: Option<u64>,
-    /// Things put on or carried; by chance if left out.
-    pub extras: Option<Vec<Extra>>,
-}
-
-impl Default for PersonSettings {
-    fn default() -> Self {
-        Self {
-            path: Vec::new(),
-            wander: 0,
-            walk: Walk::Plain,
-            speed_mps: 1.1,
-            start_s: 0.0,
-            rest_s: Vec::new(),
-            enters_s: 0.0,
-            leaves_s: None,
-            at_end: AtEnd::Stop,
-            trick: Trick::None,
-            hide_s: 3.0,
-            offset: [0.0; 2],
-            posture: Posture::Upright,
-            companions: 0,
-            heading_deg: None,
-            spin_deg_per_s: 0.0,
-            height_m: None,
-            subject: None,
-            look: None,
-            extras: None,
-        }
+settings! {
+    /// A person.
+    pub struct PersonSettings {
+        /// Points to walk through; the first is where they start.
+        pub path: Vec<[f64; 2]>,
+        /// Number of points that follow the path, which the seed chooses: anywhere in the
+        /// room, off furniture and the robot's start.
+        #[schemars(range(max = 1000))]
+        pub wander: usize = 0,
+        /// Way of walking.
+        #[serde(skip_serializing_if = "Walk::is_plain")]
+        pub walk: Walk = Walk::Plain,
+        /// Preferred speed, m/s.
+        #[schemars(range(min = 0.0, max = 2.0))]
+        pub speed_mps: f64 = 1.1,
+        /// Stands until then, s.
+        pub start_s: f64 = 0.0,
+        /// Rests at the points of the path for this long on every visit, s; none where
+        /// the list ends.
+        #[schemars(inner(range(min = 0.0, max = 3600.0)))]
+        pub rest_s: Vec<f64>,
+        /// Time before which the person is not in the room, s: a detector that learns the
+        /// appearance of the empty room needs to see it.
+        pub enters_s: f64 = 0.0,
+        /// End of the stay in the room, s; none if left out.
+        pub leaves_s: Option<f64>,
+        /// Behaviour at the end of the path.
+        pub at_end: AtEnd = AtEnd::Stop,
+        /// Behaviour when hidden.
+        pub trick: Trick = Trick::None,
+        /// For how long the trick `stop` stays hidden, s.
+        pub hide_s: f64 = 3.0,
+        /// The whole path is shifted by this, m.
+        pub offset: [f64; 2] = [0.0; 2],
+        /// Posture.
+        pub posture: Posture = Posture::Upright,
+        /// Number of others that walk along, 0.6 to 1 m apart; they count as people of their own.
+        #[schemars(range(max = 3))]
+        pub companions: usize = 0,
+        /// Direction of the face at the start, degrees; the way ahead if left out.
+        pub heading_deg: Option<f64>,
+        /// Turns on the spot, degrees per second.
+        pub spin_deg_per_s: f64 = 0.0,
+        /// Body height, m; by chance if left out.
+        pub height_m: Option<f64>,
+        /// Number in the pool of people that the seed's split has, 0 to 499; by
+        /// chance if left out.
+        pub subject: Option<u64>,
+        /// In the clothes of this number of the pool; in their own if left out.
+        pub look: Option<u64>,
+        /// Things put on or carried; by chance if left out.
+        pub extras: Option<Vec<Extra>>,
     }
 }
 

@@ -7,7 +7,7 @@ use nalgebra::{
     Isometry2, Isometry3, Point2, Point3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3,
 };
 use tagalong_core::{Images, RgbImage, RightImage, WheelSpeeds};
-use tagalong_geometry::{Camera, Distortion, Panorama, Pinhole, Rect};
+use tagalong_geometry::{Camera, Panorama, Pinhole, Rect};
 
 use crate::approach::Approacher;
 use crate::behaviour::Walker;
@@ -659,15 +659,8 @@ impl Simulation {
 
 fn camera(scene: &Scene) -> Camera {
     let settings = &scene.camera;
-    let (w, h) = (settings.width as f64, settings.height as f64);
-    let f = 0.5 * w / (0.5 * settings.field_of_view_deg.to_radians()).tan();
-    let lens = Pinhole {
-        fx: f,
-        fy: f,
-        cx: 0.5 * (w - 1.0),
-        cy: 0.5 * (h - 1.0),
-        distortion: Distortion::None,
-    };
+    let f = 0.5 * settings.width as f64 / (0.5 * settings.field_of_view_deg.to_radians()).tan();
+    let lens = Pinhole::centred(f, settings.width, settings.height);
     let pitch = settings.pitch_down_deg.to_radians();
     Camera::mounted(lens, settings.width, settings.height, settings.height_m, pitch, 0.0)
 }

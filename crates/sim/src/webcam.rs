@@ -2,53 +2,36 @@
 //! system, as a laboratory builds it from webcams.
 
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-use tagalong_core::RgbImage;
-use tagalong_geometry::{Camera, Distortion, Pinhole};
+use tagalong_core::{RgbImage, settings};
+use tagalong_geometry::{Camera, Pinhole};
 
 use crate::render::draw;
 use crate::sensor::{Exposure, Moment};
 use crate::world::World;
 
-/// A camera at a fixed place.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct WebcamSettings {
-    /// Where it hangs, m.
-    pub at: [f64; 2],
-    /// Height above the floor, m.
-    pub height_m: f64,
-    /// Where it looks, degrees.
-    pub heading_deg: f64,
-    /// Looks this far down, degrees.
-    pub pitch_down_deg: f64,
-    /// Horizontal field of view, degrees.
-    #[schemars(range(min = 10.0, max = 150.0))]
-    pub field_of_view_deg: f64,
-    /// Columns.
-    #[schemars(range(min = 8, max = 4096))]
-    pub width: usize,
-    /// Rows.
-    #[schemars(range(min = 8, max = 4096))]
-    pub height: usize,
-    /// Images per second.
-    #[schemars(range(min = 0.1, max = 100.0))]
-    pub rate_hz: f64,
-}
-
-impl Default for WebcamSettings {
-    fn default() -> Self {
-        Self {
-            at: [0.1, 0.1],
-            height_m: 2.2,
-            heading_deg: 45.0,
-            pitch_down_deg: 15.0,
-            field_of_view_deg: 80.0,
-            width: 320,
-            height: 240,
-            rate_hz: 3.0,
-        }
+settings! {
+    /// A camera at a fixed place.
+    pub struct WebcamSettings {
+        /// Where it hangs, m.
+        pub at: [f64; 2] = [0.1, 0.1],
+        /// Height above the floor, m.
+        pub height_m: f64 = 2.2,
+        /// Where it looks, degrees.
+        pub heading_deg: f64 = 45.0,
+        /// Looks this far down, degrees.
+        pub pitch_down_deg: f64 = 15.0,
+        /// Horizontal field of view, degrees.
+        #[schemars(range(min = 10.0, max = 150.0))]
+        pub field_of_view_deg: f64 = 80.0,
+        /// Columns.
+        #[schemars(range(min = 8, max = 4096))]
+        pub width: usize = 320,
+        /// Rows.
+        #[schemars(range(min = 8, max = 4096))]
+        pub height: usize = 240,
+        /// Images per second.
+        #[schemars(range(min = 0.1, max = 100.0))]
+        pub rate_hz: f64 = 3.0,
     }
 }
 
@@ -56,13 +39,7 @@ impl WebcamSettings {
     /// The camera; its `robot_from_camera` is its pose in the **world**.
     pub fn camera(&self) -> Camera {
         let f = 0.5 * self.width as f64 / (0.5 * self.field_of_view_deg.to_radians()).tan();
-        let lens = Pinhole {
-            fx: f,
-            fy: f,
-            cx: 0.5 * (self.width as f64 - 1.0),
-            cy: 0.5 * (self.height as f64 - 1.0),
-            distortion: Distortion::None,
-        };
+        let lens = Pinhole::centred(f, self.width, self.height);
         let down = self.pitch_down_deg.to_radians();
         let camera = Camera::mounted(lens, self.width, self.height, self.height_m, down, 0.0);
         let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), self.heading_deg.to_radians());

@@ -2,73 +2,27 @@
 
 use std::path::{Path, PathBuf};
 
-/// Names of the scenes of `configs/scenes`, with their texts.
-const BUILT_IN: [(&str, &str); 64] = [
-    ("among-circular", include_str!("../configs/scenes/among-circular.toml")),
-    ("among-clutter", include_str!("../configs/scenes/among-clutter.toml")),
-    ("among-corridor", include_str!("../configs/scenes/among-corridor.toml")),
-    ("among-crossing", include_str!("../configs/scenes/among-crossing.toml")),
-    ("among-doorway", include_str!("../configs/scenes/among-doorway.toml")),
-    ("approach", include_str!("../configs/scenes/approach.toml")),
-    ("behind-glass", include_str!("../configs/scenes/behind-glass.toml")),
-    ("behind-glass-sonar", include_str!("../configs/scenes/behind-glass-sonar.toml")),
-    ("cafeteria", include_str!("../configs/scenes/cafeteria.toml")),
-    ("cafeteria-high", include_str!("../configs/scenes/cafeteria-high.toml")),
-    ("cheap-laser", include_str!("../configs/scenes/cheap-laser.toml")),
-    ("corridor", include_str!("../configs/scenes/corridor.toml")),
-    ("corridor-high", include_str!("../configs/scenes/corridor-high.toml")),
-    ("crossing", include_str!("../configs/scenes/crossing.toml")),
-    ("crossing-four", include_str!("../configs/scenes/crossing-four.toml")),
-    ("crossing-hidden", include_str!("../configs/scenes/crossing-hidden.toml")),
-    ("crossing-oblique", include_str!("../configs/scenes/crossing-oblique.toml")),
-    ("crossing-parallel", include_str!("../configs/scenes/crossing-parallel.toml")),
-    ("crossing-three", include_str!("../configs/scenes/crossing-three.toml")),
-    ("crowd", include_str!("../configs/scenes/crowd.toml")),
-    ("daylight", include_str!("../configs/scenes/daylight.toml")),
-    ("demo", include_str!("../configs/scenes/demo.toml")),
-    ("empty-clutter", include_str!("../configs/scenes/empty-clutter.toml")),
-    ("empty-real", include_str!("../configs/scenes/empty-real.toml")),
-    ("follow-alike", include_str!("../configs/scenes/follow-alike.toml")),
-    ("follow-around", include_str!("../configs/scenes/follow-around.toml")),
-    ("follow-between", include_str!("../configs/scenes/follow-between.toml")),
-    ("follow-child", include_str!("../configs/scenes/follow-child.toml")),
-    ("follow-coat-stand", include_str!("../configs/scenes/follow-coat-stand.toml")),
-    ("follow-corner", include_str!("../configs/scenes/follow-corner.toml")),
-    ("follow-crowd", include_str!("../configs/scenes/follow-crowd.toml")),
-    ("follow-crowd-ten", include_str!("../configs/scenes/follow-crowd-ten.toml")),
-    ("follow-doors", include_str!("../configs/scenes/follow-doors.toml")),
-    ("follow-dropped", include_str!("../configs/scenes/follow-dropped.toml")),
-    ("follow-fast", include_str!("../configs/scenes/follow-fast.toml")),
-    ("follow-gets-up", include_str!("../configs/scenes/follow-gets-up.toml")),
-    ("follow-latency", include_str!("../configs/scenes/follow-latency.toml")),
-    ("follow-passing", include_str!("../configs/scenes/follow-passing.toml")),
-    ("follow-ramp", include_str!("../configs/scenes/follow-ramp.toml")),
-    ("follow-return-15", include_str!("../configs/scenes/follow-return-15.toml")),
-    ("follow-return-30", include_str!("../configs/scenes/follow-return-30.toml")),
-    ("follow-return-5", include_str!("../configs/scenes/follow-return-5.toml")),
-    ("follow-return-two", include_str!("../configs/scenes/follow-return-two.toml")),
-    ("follow-step-in", include_str!("../configs/scenes/follow-step-in.toml")),
-    ("follow-swap", include_str!("../configs/scenes/follow-swap.toml")),
-    ("follow-tilt", include_str!("../configs/scenes/follow-tilt.toml")),
-    ("follow-turns", include_str!("../configs/scenes/follow-turns.toml")),
-    ("following", include_str!("../configs/scenes/following.toml")),
-    ("full-occlusion", include_str!("../configs/scenes/full-occlusion.toml")),
-    ("lidar-rings", include_str!("../configs/scenes/lidar-rings.toml")),
-    ("lidar-rosette", include_str!("../configs/scenes/lidar-rosette.toml")),
-    ("mirrors", include_str!("../configs/scenes/mirrors.toml")),
-    ("office", include_str!("../configs/scenes/office.toml")),
-    ("office-high", include_str!("../configs/scenes/office-high.toml")),
-    ("omni-hat", include_str!("../configs/scenes/omni-hat.toml")),
-    ("omni-moving", include_str!("../configs/scenes/omni-moving.toml")),
-    ("omni-people", include_str!("../configs/scenes/omni-people.toml")),
-    ("omni-room", include_str!("../configs/scenes/omni-room.toml")),
-    ("sample", include_str!("../configs/scenes/sample.toml")),
-    ("square-walk", include_str!("../configs/scenes/square-walk.toml")),
-    ("static-high", include_str!("../configs/scenes/static-high.toml")),
-    ("stereo-follow-passing", include_str!("../configs/scenes/stereo-follow-passing.toml")),
-    ("stereo-hall", include_str!("../configs/scenes/stereo-hall.toml")),
-    ("turntable", include_str!("../configs/scenes/turntable.toml")),
-];
+/// Names and texts of scenes.
+macro_rules! scenes {
+    ($($name:literal)*) => {
+        &[$(($name, include_str!(concat!("../configs/scenes/", $name, ".toml")))),*]
+    };
+}
+
+/// The scenes of `configs/scenes`.
+const BUILT_IN: &[(&str, &str)] = scenes! {
+    "among-circular" "among-clutter" "among-corridor" "among-crossing" "among-doorway" "approach"
+    "behind-glass" "behind-glass-sonar" "cafeteria" "cafeteria-high" "cheap-laser" "corridor"
+    "corridor-high" "crossing" "crossing-four" "crossing-hidden" "crossing-oblique"
+    "crossing-parallel" "crossing-three" "crowd" "daylight" "demo" "empty-clutter" "empty-real"
+    "follow-alike" "follow-around" "follow-between" "follow-child" "follow-coat-stand"
+    "follow-corner" "follow-crowd" "follow-crowd-ten" "follow-doors" "follow-dropped" "follow-fast"
+    "follow-gets-up" "follow-latency" "follow-passing" "follow-ramp" "follow-return-15"
+    "follow-return-30" "follow-return-5" "follow-return-two" "follow-step-in" "follow-swap"
+    "follow-tilt" "follow-turns" "following" "full-occlusion" "lidar-rings" "lidar-rosette"
+    "mirrors" "office" "office-high" "omni-hat" "omni-moving" "omni-people" "omni-room" "sample"
+    "square-walk" "static-high" "stereo-follow-passing" "stereo-hall" "turntable"
+};
 
 /// Folder that the names stand for.
 const FOLDER: &str = "configs/scenes";

@@ -241,7 +241,7 @@ const CHI_SQUARED_2_99: f64 = 9.21;
 mod tests {
     use nalgebra::{Matrix3, Point3};
     use tagalong_core::Association;
-    use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole};
+    use tagalong_geometry::{Camera, ImageBox, Pinhole};
 
     use super::*;
 
@@ -254,12 +254,11 @@ mod tests {
     }
 
     fn person(x: f64, y: f64) -> Detection {
-        let lens =
-            Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
         let position = Point3::new(x, y, 1.6);
         Detection::new("test", position, Matrix3::identity() * 0.01, 1.0).with_image(
             ImageBox::upper_body(
-                Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0).upper_body(&position),
+                Camera::mounted(Pinhole::centred(500.0, 640, 480), 640, 480, 1.2, 0.0, 0.0)
+                    .upper_body(&position),
             ),
         )
     }

@@ -54,14 +54,12 @@ fn lateral_covariance(
 
 #[cfg(test)]
 mod tests {
-    use tagalong_geometry::{Distortion, Pinhole};
+    use tagalong_geometry::Pinhole;
 
     use super::*;
 
     fn camera() -> Camera {
-        let lens =
-            Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
-        Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0)
+        Camera::mounted(Pinhole::centred(500.0, 640, 480), 640, 480, 1.2, 0.0, 0.0)
     }
 
     #[test]

@@ -235,14 +235,12 @@ pub(crate) fn occluder_of_detection(
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
-    use tagalong_geometry::{ConicalMirror, Distortion, Panorama, Pinhole};
+    use tagalong_geometry::{ConicalMirror, Panorama, Pinhole};
 
     use super::*;
 
     fn camera() -> Camera {
-        let lens =
-            Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
-        Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0)
+        Camera::mounted(Pinhole::centred(500.0, 640, 480), 640, 480, 1.2, 0.0, 0.0)
     }
 
     proptest! {

@@ -166,7 +166,7 @@ mod tests {
         Capabilities, Detection, EgoMotion, Estimate, Images, Inputs, Person, Result, Stamp,
         TrackId,
     };
-    use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
+    use tagalong_geometry::{Camera, Pinhole, Rect};
 
     use super::*;
 
@@ -210,9 +210,8 @@ mod tests {
 
     #[test]
     fn a_track_gets_the_best_detection_that_passes_and_the_rest_say_why_not() {
-        let lens =
-            Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
-        let camera = Arc::new(Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0));
+        let camera =
+            Arc::new(Camera::mounted(Pinhole::centred(500.0, 640, 480), 640, 480, 1.2, 0.0, 0.0));
         let motion = EgoMotion::at_rest(0.1);
         let frame = Frame::new(1, Stamp::default(), camera, motion, Images::default());
         let mut stage = SearchStage {

@@ -67,12 +67,11 @@ mod tests {
 
     use nalgebra::Point3;
     use tagalong_core::{EgoMotion, Images, Stamp};
-    use tagalong_geometry::{Camera, Distortion, Pinhole};
+    use tagalong_geometry::{Camera, Pinhole};
 
     fn frame() -> Frame {
-        let lens =
-            Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
-        let camera = Arc::new(Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0));
+        let camera =
+            Arc::new(Camera::mounted(Pinhole::centred(500.0, 640, 480), 640, 480, 1.2, 0.0, 0.0));
         Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), Images::default())
     }
 

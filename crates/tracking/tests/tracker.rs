@@ -12,7 +12,7 @@ use tagalong_core::{
     PerPerson, Person, Query, Result, Stamp, Track, TrackId, Update, Verifier, Visualisation,
 };
 use tagalong_filters::last_seen::LastSeen;
-use tagalong_geometry::{Camera, Distortion, Pinhole};
+use tagalong_geometry::{Camera, Pinhole};
 use tagalong_track_managers::m_of_n::MOfN;
 use tagalong_tracking::{
     DetectorSettings, DetectorSlot, Guarded, Identities, Outcome, Parts, Preprocessed,
@@ -21,8 +21,7 @@ use tagalong_tracking::{
 use tagalong_vision::Describer;
 
 fn camera() -> Camera {
-    let lens = Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
-    Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0)
+    Camera::mounted(Pinhole::centred(500.0, 640, 480), 640, 480, 1.2, 0.0, 0.0)
 }
 
 /// Returns a frame at a time, s, of a robot that drove so far ahead, m.

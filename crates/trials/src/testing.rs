@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry2, Point3, SMatrix, Vector2};
 use tagalong_core::{Estimate, Person, Stamp, Track, TrackId};
-use tagalong_geometry::{Camera, Distortion, Pinhole};
+use tagalong_geometry::{Camera, Pinhole};
 use tagalong_pipeline::FrameReport;
 use tagalong_sim::Truth;
 
@@ -21,8 +21,7 @@ pub type FloorPosition = Option<(f64, f64)>;
 pub type Path<'a> = (u32, &'a [FloorPosition]);
 
 fn camera() -> Camera {
-    let lens = Pinhole { fx: 300.0, fy: 300.0, cx: 159.5, cy: 119.5, distortion: Distortion::None };
-    Camera::mounted(lens, 320, 240, 1.2, 0.0, 0.0)
+    Camera::mounted(Pinhole::centred(300.0, 320, 240), 320, 240, 1.2, 0.0, 0.0)
 }
 
 /// A robot at rest, and for each person and each track a place in every frame.

@@ -87,37 +87,17 @@ impl Net {
     ];
 
     /// All numbers that are learned.
-    pub(crate) fn parts(&self) -> [&[f32]; 10] {
+    pub(crate) fn parts(&self) -> Vec<&[f32]> {
         let Self { first, second, third, fourth, weights, bias } = self;
-        [
-            &first.weights,
-            &first.bias,
-            &second.weights,
-            &second.bias,
-            &third.weights,
-            &third.bias,
-            &fourth.weights,
-            &fourth.bias,
-            weights,
-            bias,
-        ]
+        [first.parts(), second.parts(), third.parts(), fourth.parts(), [&weights[..], bias]]
+            .concat()
     }
 
     /// The same, to change them.
-    pub(crate) fn parts_mut(&mut self) -> [&mut [f32]; 10] {
+    pub(crate) fn parts_mut(&mut self) -> Vec<&mut [f32]> {
         let Self { first, second, third, fourth, weights, bias } = self;
-        [
-            &mut first.weights,
-            &mut first.bias,
-            &mut second.weights,
-            &mut second.bias,
-            &mut third.weights,
-            &mut third.bias,
-            &mut fourth.weights,
-            &mut fourth.bias,
-            weights,
-            bias,
-        ]
+        let layers = [first.parts_mut(), second.parts_mut(), third.parts_mut(), fourth.parts_mut()];
+        layers.into_iter().flatten().chain([&mut weights[..], bias]).collect()
     }
 
     /// Number of inputs of one output of each part; zero for parts that start at zero.

@@ -1,4 +1,3 @@
-use tagalong_config::Registry;
 use tagalong_conformance::context;
 use tagalong_conformance::patch::{candidate, frame, picture};
 use tagalong_core::Verifier;
@@ -11,10 +10,7 @@ fn refusal(config: Config) -> String {
 
 #[test]
 fn it_keeps_the_promises_of_its_kind() {
-    let mut registry = Registry::default();
-    crate::register(&mut registry);
-    let failures = tagalong_conformance::check_all(&registry);
-    assert!(failures.is_empty(), "{failures:#?}");
+    tagalong_conformance::assert_conforms(crate::register);
 }
 
 #[test]

@@ -442,14 +442,12 @@ impl Detector for Compressive {
 mod tests {
     use nalgebra::{Point3, SMatrix, Vector2};
     use tagalong_core::{EgoMotion, Estimate, GreyImage, Images, Person, Stamp};
-    use tagalong_geometry::{Distortion, Pinhole};
+    use tagalong_geometry::Pinhole;
 
     use super::*;
 
     fn camera() -> Camera {
-        let lens =
-            Pinhole { fx: 262.0, fy: 262.0, cx: 159.5, cy: 119.5, distortion: Distortion::None };
-        Camera::mounted(lens, 320, 240, 1.3, 0.0, 0.0)
+        Camera::mounted(Pinhole::centred(262.0, 320, 240), 320, 240, 1.3, 0.0, 0.0)
     }
 
     fn track(seen: bool, occluded: bool) -> Track {

@@ -2,7 +2,6 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, SMatrix, Vector2};
 use proptest::prelude::*;
-use tagalong_config::Registry;
 use tagalong_conformance::pattern::{blotches, part_of_box};
 use tagalong_core::{
     DepthImage, Detection, Detector, EgoMotion, Estimate, Frame, Funnel, GreyImage, Images, Person,
@@ -96,10 +95,7 @@ fn place(x: f64, y: f64) -> Point3<f64> {
 
 #[test]
 fn it_conforms() {
-    let mut registry = Registry::default();
-    crate::register(&mut registry);
-    let failures = tagalong_conformance::check_all(&registry);
-    assert!(failures.is_empty(), "{failures:#?}");
+    tagalong_conformance::assert_conforms(crate::register);
 }
 
 #[test]

@@ -198,9 +198,8 @@ mod tests {
             DepthImage::from_fn(40, 30, |x, _| if x < column { 1.0 } else { 3.0 })
         }
 
-        use tagalong_geometry::{Distortion, Pinhole};
-        let lens = Pinhole { fx: 30.0, fy: 30.0, cx: 19.5, cy: 14.5, distortion: Distortion::None };
-        let camera = Camera::mounted(lens, 40, 30, 1.0, 0.0, 0.0);
+        use tagalong_geometry::Pinhole;
+        let camera = Camera::mounted(Pinhole::centred(30.0, 40, 30), 40, 30, 1.0, 0.0, 0.0);
         let mut around = NearestObstacles::new();
         let board_m = 1.0_f64.hypot(0.35);
         let low = [0.1, 1.5];

@@ -9,9 +9,7 @@
 //! on walks that they were not learnt from.
 
 use nalgebra::{Matrix2, Matrix4, Point2, Vector2};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-use tagalong_core::{EgoMotion, Track};
+use tagalong_core::{EgoMotion, Track, settings};
 
 /// Above this neither a coordinate, m, nor a speed, m/s, makes sense.
 const MOST: f64 = 1e6;
@@ -27,36 +25,26 @@ const LEAST_S: f64 = 0.1;
 /// Least variance of a place, m²: an ellipse without area has no inverse.
 const LEAST_VARIANCE_M2: f64 = 1e-6;
 
-/// Motion that is expected of people.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct ForecastSettings {
-    /// Rate at which a velocity decays, 1/s; 0 for a constant velocity.
-    #[schemars(range(min = 0.0, max = 10.0))]
-    pub damping_per_s: f64,
-    /// Spectral density of the acceleration of a standing person, m²/s³.
-    #[schemars(range(min = 0.0, max = 1e3))]
-    pub unrest: f64,
-    /// Additional spectral density for each (m/s)² of the speed, 1/s.
-    #[schemars(range(min = 0.0, max = 1e3))]
-    pub unrest_by_speed: f64,
-    /// Factor on the covariance that the filter of the track states.
-    #[schemars(range(min = 0.0, max = 100.0))]
-    pub filter_part: f64,
-    /// Degrees of freedom of the place after a second, beyond two; they fall with the square of the time.
-    #[schemars(range(min = 0.1, max = 1e9))]
-    pub tail_dof: f64,
-}
-
-impl Default for ForecastSettings {
-    fn default() -> Self {
-        Self {
-            damping_per_s: 0.1,
-            unrest: 0.07,
-            unrest_by_speed: 0.0,
-            filter_part: 0.5,
-            tail_dof: 6.0,
-        }
+settings! {
+    /// Motion that is expected of people.
+    #[derive(Copy)]
+    pub struct ForecastSettings {
+        /// Rate at which a velocity decays, 1/s; 0 for a constant velocity.
+        #[schemars(range(min = 0.0, max = 10.0))]
+        pub damping_per_s: f64 = 0.1,
+        /// Spectral density of the acceleration of a standing person, m²/s³.
+        #[schemars(range(min = 0.0, max = 1e3))]
+        pub unrest: f64 = 0.07,
+        /// Additional spectral density for each (m/s)² of the speed, 1/s.
+        #[schemars(range(min = 0.0, max = 1e3))]
+        pub unrest_by_speed: f64 = 0.0,
+        /// Factor on the covariance that the filter of the track states.
+        #[schemars(range(min = 0.0, max = 100.0))]
+        pub filter_part: f64 = 0.5,
+        /// Degrees of freedom of the place after a second, beyond two; they fall with the square of
+        /// the time.
+        #[schemars(range(min = 0.1, max = 1e9))]
+        pub tail_dof: f64 = 6.0,
     }
 }
 

@@ -45,9 +45,6 @@ mod tests {
 
     #[test]
     fn the_promises_of_controllers_are_kept() {
-        let mut registry = Registry::default();
-        register(&mut registry);
-        let failures = tagalong_conformance::check_all(&registry);
-        assert!(failures.is_empty(), "{failures:#?}");
+        tagalong_conformance::assert_conforms(register);
     }
 }

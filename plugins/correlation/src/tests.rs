@@ -2,7 +2,6 @@ use std::sync::Arc;
 
 use nalgebra::{Point2, Point3, SMatrix, Vector2};
 use proptest::prelude::*;
-use tagalong_config::Registry;
 use tagalong_conformance::pattern::{blotches, part_of_box};
 use tagalong_core::{
     DepthImage, Detection, Detector, EgoMotion, Estimate, Frame, Funnel, GreyImage, Images, Person,
@@ -270,10 +269,7 @@ fn without_contrast_there_is_no_correlation() {
 
 #[test]
 fn it_conforms() {
-    let mut registry = Registry::default();
-    crate::register(&mut registry);
-    let failures = tagalong_conformance::check_all(&registry);
-    assert!(failures.is_empty(), "{failures:#?}");
+    tagalong_conformance::assert_conforms(crate::register);
 }
 
 /// A picture laid somewhere, so many cells from the expected place.

@@ -1,45 +1,46 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tagalong_core::settings;
 
-/// Settings of `depth-net`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Config {
-    /// Model file, relative to the config; empty: the built-in model.
-    pub model: String,
-    /// Sensor whose readings make the map.
-    pub source: Source,
-    /// Log-odds from which a peak of the map is a person. At the default the scores on rooms left
-    /// out are those of the model's card.
-    pub discover_score: f64,
-    /// Log-odds from which a peak is a person near a confirmed track.
-    pub track_score: f64,
-    /// A peak belongs to a track if it is nearer than this, m.
-    #[schemars(range(min = 1e-6, max = 10.0))]
-    pub track_radius_m: f64,
-    /// Upper limit of the log-odds of a detection.
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub max_score: f64,
-    /// Two people are at least this far apart, m.
-    #[schemars(range(min = 0.0, max = 10.0))]
-    pub separation_m: f64,
-    /// Standard deviation of a head's place on the floor, m.
-    #[schemars(range(min = 1e-6, max = 10.0))]
-    pub sigma_m: f64,
-    /// Standard deviation of a head's height as the network tells it, m.
-    #[schemars(range(min = 1e-6, max = 10.0))]
-    pub sigma_height_m: f64,
-    /// The same of a head outside of the image, m.
-    #[schemars(range(min = 1e-6, max = 10.0))]
-    pub sigma_unseen_height_m: f64,
-    /// Measures a head on the surface that the depth image shows of it, where it does; otherwise the
-    /// place and the height are those of the network.
-    pub measure_heads: bool,
-    /// Standard deviation of the height of a head that was measured, m.
-    #[schemars(range(min = 1e-6, max = 10.0))]
-    pub sigma_measured_height_m: f64,
-    /// Settings of the fit; only `tagalong train` reads them.
-    pub training: Training,
+settings! {
+    /// Settings of `depth-net`.
+    pub struct Config {
+        /// Model file, relative to the config; empty: the built-in model.
+        pub model: String,
+        /// Sensor whose readings make the map.
+        pub source: Source = Source::Depth,
+        /// Log-odds from which a peak of the map is a person. At the default the scores on rooms
+        /// left out are those of the model's card.
+        pub discover_score: f64 = 1.0,
+        /// Log-odds from which a peak is a person near a confirmed track.
+        pub track_score: f64 = -1.5,
+        /// A peak belongs to a track if it is nearer than this, m.
+        #[schemars(range(min = 1e-6, max = 10.0))]
+        pub track_radius_m: f64 = 0.6,
+        /// Upper limit of the log-odds of a detection.
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        pub max_score: f64 = 6.0,
+        /// Two people are at least this far apart, m.
+        #[schemars(range(min = 0.0, max = 10.0))]
+        pub separation_m: f64 = 0.4,
+        /// Standard deviation of a head's place on the floor, m.
+        #[schemars(range(min = 1e-6, max = 10.0))]
+        pub sigma_m: f64 = 0.08,
+        /// Standard deviation of a head's height as the network tells it, m.
+        #[schemars(range(min = 1e-6, max = 10.0))]
+        pub sigma_height_m: f64 = 0.08,
+        /// The same of a head outside of the image, m.
+        #[schemars(range(min = 1e-6, max = 10.0))]
+        pub sigma_unseen_height_m: f64 = 0.2,
+        /// Measures a head on the surface that the depth image shows of it, where it does;
+        /// otherwise the place and the height are those of the network.
+        pub measure_heads: bool = true,
+        /// Standard deviation of the height of a head that was measured, m.
+        #[schemars(range(min = 1e-6, max = 10.0))]
+        pub sigma_measured_height_m: f64 = 0.03,
+        /// Settings of the fit; only `tagalong train` reads them.
+        pub training: Training,
+    }
 }
 
 /// Sensor whose readings make the map.
@@ -53,75 +54,43 @@ pub enum Source {
     Points,
 }
 
-impl Default for Config {
-    fn default() -> Self {
-        Self {
-            model: String::new(),
-            source: Source::Depth,
-            discover_score: 1.0,
-            track_score: -1.5,
-            track_radius_m: 0.6,
-            max_score: 6.0,
-            separation_m: 0.4,
-            sigma_m: 0.08,
-            sigma_height_m: 0.08,
-            sigma_unseen_height_m: 0.2,
-            measure_heads: true,
-            sigma_measured_height_m: 0.03,
-            training: Training::default(),
-        }
+settings! {
+    /// Settings of the fit.
+    pub struct Training {
+        /// Steps on simulated rooms alone.
+        #[schemars(range(min = 1, max = 1_000_000))]
+        pub steps: usize = 800,
+        /// Further steps on simulated and real rooms, which are repeated with each room left out.
+        #[schemars(range(min = 1, max = 1_000_000))]
+        pub real_steps: usize = 100,
+        /// Frames per step.
+        #[schemars(range(min = 1, max = 1024))]
+        pub batch: usize = 12,
+        /// Fraction of real frames in the further steps.
+        #[schemars(range(min = 0.0, max = 1.0))]
+        pub real_share: f64 = 0.6,
+        /// Largest step of a weight.
+        #[schemars(range(min = 1e-9, max = 1.0))]
+        pub rate: f64 = 3e-3,
+        /// Weights shrink by this fraction of a step.
+        #[schemars(range(min = 0.0, max = 1.0))]
+        pub decay: f64 = 1e-4,
     }
 }
 
-/// Settings of the fit.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Training {
-    /// Steps on simulated rooms alone.
-    #[schemars(range(min = 1, max = 1_000_000))]
-    pub steps: usize,
-    /// Further steps on simulated and real rooms, which are repeated with each room left out.
-    #[schemars(range(min = 1, max = 1_000_000))]
-    pub real_steps: usize,
-    /// Frames per step.
-    #[schemars(range(min = 1, max = 1024))]
-    pub batch: usize,
-    /// Fraction of real frames in the further steps.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub real_share: f64,
-    /// Largest step of a weight.
-    #[schemars(range(min = 1e-9, max = 1.0))]
-    pub rate: f64,
-    /// Weights shrink by this fraction of a step.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub decay: f64,
-}
-
-impl Default for Training {
-    fn default() -> Self {
-        Self { steps: 800, real_steps: 100, batch: 12, real_share: 0.6, rate: 3e-3, decay: 1e-4 }
-    }
-}
-
-/// Settings of `depth-net-verifier`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct VerifierConfig {
-    /// Model file, relative to the config; empty: the built-in model.
-    pub model: String,
-    /// The largest log-odds nearer to the candidate than this count, m.
-    #[schemars(range(min = 0.1, max = 2.0))]
-    pub radius_m: f64,
-    /// Weight of these log-odds beside the score of the detector.
-    pub weight: f64,
-    /// Log-odds of one frame are limited to plus and minus this.
-    pub limit: f64,
-    /// Added to the log-odds of each frame; below zero the verifier is stricter.
-    pub bias: f64,
-}
-
-impl Default for VerifierConfig {
-    fn default() -> Self {
-        Self { model: String::new(), radius_m: 0.25, weight: 1.0, limit: 4.0, bias: 0.0 }
+settings! {
+    /// Settings of `depth-net-verifier`.
+    pub struct VerifierConfig {
+        /// Model file, relative to the config; empty: the built-in model.
+        pub model: String,
+        /// The largest log-odds nearer to the candidate than this count, m.
+        #[schemars(range(min = 0.1, max = 2.0))]
+        pub radius_m: f64 = 0.25,
+        /// Weight of these log-odds beside the score of the detector.
+        pub weight: f64 = 1.0,
+        /// Log-odds of one frame are limited to plus and minus this.
+        pub limit: f64 = 4.0,
+        /// Added to the log-odds of each frame; below zero the verifier is stricter.
+        pub bias: f64 = 0.0,
     }
 }

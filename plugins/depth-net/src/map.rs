@@ -316,8 +316,7 @@ mod tests {
     use super::*;
 
     fn camera(height_m: f64) -> Camera {
-        let lens = Pinhole { fx: 60.0, fy: 60.0, cx: 39.5, cy: 29.5, distortion: Distortion::None };
-        Camera::mounted(lens, 80, 60, height_m, 0.0, 0.0)
+        Camera::mounted(Pinhole::centred(60.0, 80, 60), 80, 60, height_m, 0.0, 0.0)
     }
 
     /// The coarse cell of a place.
@@ -359,17 +358,14 @@ mod tests {
     #[test]
     fn a_larger_image_of_the_same_scene_gives_nearly_the_same_map() {
         let small = camera(1.0);
-        let lens =
-            Pinhole { fx: 480.0, fy: 480.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+        let lens = Pinhole::centred(480.0, 640, 480);
         let large = Camera::mounted(lens, 640, 480, 1.0, 0.0, 0.0);
         let (camera, image) = reduced(&large, &DepthImage::filled(640, 480, 2.53)).unwrap();
         assert_eq!((image.width(), image.height(), camera.width), (320, 240, 320));
         assert!(reduced(&small, &DepthImage::filled(80, 60, 1.0)).is_none());
         let ray = camera.ray(Point2::new(10.0, 20.0)) - large.ray(Point2::new(21.0, 41.0));
         assert!(ray.norm() < 1e-12);
-        let lens =
-            Pinhole { fx: 960.0, fy: 960.0, cx: 639.5, cy: 479.5, distortion: Distortion::None };
-        let huge = Camera::mounted(lens, 1280, 960, 1.0, 0.0, 0.0);
+        let huge = Camera::mounted(Pinhole::centred(960.0, 1280, 960), 1280, 960, 1.0, 0.0, 0.0);
         let depth = DepthImage::from_fn(1280, 960, |x, y| (x + 2000 * y) as f32);
         let (fourth, thinned) = reduced(&huge, &depth).unwrap();
         assert_eq!((thinned.width(), thinned.height(), fourth.height), (320, 240, 240));

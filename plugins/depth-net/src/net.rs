@@ -105,41 +105,24 @@ impl Net {
         [9 * FloorMap::FINE, 0, 9 * JOINED, 0, 9 * WIDE, 0, 9 * WIDE, 0, 9 * WIDE, 0, WIDE, 0];
 
     /// All numbers that are learned.
-    pub(crate) fn parts(&self) -> [&[f32]; 12] {
+    pub(crate) fn parts(&self) -> Vec<&[f32]> {
         let Self { first, second, third, fourth, fifth, last } = self;
-        [
-            &first.weights,
-            &first.bias,
-            &second.weights,
-            &second.bias,
-            &third.weights,
-            &third.bias,
-            &fourth.weights,
-            &fourth.bias,
-            &fifth.weights,
-            &fifth.bias,
-            &last.weights,
-            &last.bias,
-        ]
+        [first.parts(), second.parts(), third.parts(), fourth.parts(), fifth.parts(), last.parts()]
+            .concat()
     }
 
     /// The same, mutably.
-    pub(crate) fn parts_mut(&mut self) -> [&mut [f32]; 12] {
+    pub(crate) fn parts_mut(&mut self) -> Vec<&mut [f32]> {
         let Self { first, second, third, fourth, fifth, last } = self;
-        [
-            &mut first.weights,
-            &mut first.bias,
-            &mut second.weights,
-            &mut second.bias,
-            &mut third.weights,
-            &mut third.bias,
-            &mut fourth.weights,
-            &mut fourth.bias,
-            &mut fifth.weights,
-            &mut fifth.bias,
-            &mut last.weights,
-            &mut last.bias,
-        ]
+        let layers = [
+            first.parts_mut(),
+            second.parts_mut(),
+            third.parts_mut(),
+            fourth.parts_mut(),
+            fifth.parts_mut(),
+            last.parts_mut(),
+        ];
+        layers.into_iter().flatten().collect()
     }
 
     /// Computes the answer for each coarse cell that is in view; all others stay zero.

@@ -265,7 +265,7 @@ fn top_of(areas: &[f64; LAYERS]) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_geometry::{Distortion, Pinhole};
+    use tagalong_geometry::Pinhole;
 
     use super::*;
 
@@ -273,9 +273,7 @@ mod tests {
     const HEIGHT: usize = 240;
 
     fn camera() -> Camera {
-        let lens =
-            Pinhole { fx: 260.0, fy: 260.0, cx: 159.5, cy: 119.5, distortion: Distortion::None };
-        Camera::mounted(lens, WIDTH, HEIGHT, 1.2, 0.1, 0.0)
+        Camera::mounted(Pinhole::centred(260.0, WIDTH, HEIGHT), WIDTH, HEIGHT, 1.2, 0.1, 0.0)
     }
 
     /// A ball on a pillar, which are a head and a body, in front of a wall at `wall_m`; pixels for

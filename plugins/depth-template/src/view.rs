@@ -194,13 +194,12 @@ impl MetricImage {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_geometry::{Distortion, Pinhole};
+    use tagalong_geometry::Pinhole;
 
     use super::*;
 
     fn camera(pitch_rad: f64) -> Arc<Camera> {
-        let lens = Pinhole { fx: 60.0, fy: 60.0, cx: 31.5, cy: 23.5, distortion: Distortion::None };
-        Arc::new(Camera::mounted(lens, 64, 48, 1.2, pitch_rad, 0.1))
+        Arc::new(Camera::mounted(Pinhole::centred(60.0, 64, 48), 64, 48, 1.2, pitch_rad, 0.1))
     }
 
     fn rows(scale: usize) -> RowSums {

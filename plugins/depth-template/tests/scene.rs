@@ -9,21 +9,12 @@ use tagalong_core::{
     Stamp, Track, TrackId,
 };
 use tagalong_depth_template::{Cost, DepthTemplate, DepthTemplateConfig, render};
-use tagalong_geometry::{Camera, Distortion, HEAD_RADIUS_M, Pinhole};
+use tagalong_geometry::{Camera, HEAD_RADIUS_M, Pinhole};
 
 const CAMERA_HEIGHT_M: f64 = 1.2;
 
 fn camera(width: usize) -> Arc<Camera> {
-    let w = width as f64;
-    let h = 0.75 * width as f64;
-    let f = 0.83 * w;
-    let lens = Pinhole {
-        fx: f,
-        fy: f,
-        cx: 0.5 * (w - 1.0),
-        cy: 0.5 * (h - 1.0),
-        distortion: Distortion::None,
-    };
+    let lens = Pinhole::centred(0.83 * width as f64, width, 3 * width / 4);
     Arc::new(Camera::mounted(lens, width, 3 * width / 4, CAMERA_HEIGHT_M, 0.0, 0.0))
 }
 

@@ -152,7 +152,7 @@ mod tests {
 
     use nalgebra::{Point3, SMatrix, Vector2};
     use tagalong_core::{EgoMotion, Estimate, Images, Person, Stamp, Track, TrackId};
-    use tagalong_geometry::{Distortion, HEAD_RADIUS_M, Pinhole};
+    use tagalong_geometry::{HEAD_RADIUS_M, Pinhole};
 
     use super::*;
     use crate::tests::{noise, small};
@@ -160,14 +160,7 @@ mod tests {
     const FOCAL_PX: f64 = 262.0;
 
     fn camera() -> Camera {
-        let lens = Pinhole {
-            fx: FOCAL_PX,
-            fy: FOCAL_PX,
-            cx: 79.5,
-            cy: 59.5,
-            distortion: Distortion::None,
-        };
-        Camera::mounted(lens, 160, 120, 1.5, 0.0, 0.0)
+        Camera::mounted(Pinhole::centred(FOCAL_PX, 160, 120), 160, 120, 1.5, 0.0, 0.0)
     }
 
     /// A detector with a cascade that passes some of the noise.

@@ -238,7 +238,7 @@ mod tests {
     use std::sync::Arc;
 
     use tagalong_core::{EgoMotion, Images, Stamp};
-    use tagalong_geometry::{Distortion, Pinhole};
+    use tagalong_geometry::Pinhole;
 
     use super::*;
 
@@ -248,14 +248,7 @@ mod tests {
     const SKIN: [u8; 3] = [200, 140, 110];
 
     fn camera() -> Camera {
-        let lens = Pinhole {
-            fx: FOCAL_PX,
-            fy: FOCAL_PX,
-            cx: 79.5,
-            cy: 59.5,
-            distortion: Distortion::None,
-        };
-        Camera::mounted(lens, 160, 120, 1.3, 0.0, 0.0)
+        Camera::mounted(Pinhole::centred(FOCAL_PX, 160, 120), 160, 120, 1.3, 0.0, 0.0)
     }
 
     /// Sampling points with an object, by their columns and rows.

@@ -1,5 +1,4 @@
 use proptest::prelude::*;
-use tagalong_config::Registry;
 use tagalong_core::GreyImage;
 use tagalong_geometry::Rect;
 use tagalong_math::{RandomSource, XorShift64};
@@ -186,10 +185,7 @@ fn slow_scan(image: &GreyImage, cascade: &Cascade, step: usize) -> Vec<(usize, u
 
 #[test]
 fn it_conforms() {
-    let mut registry = Registry::default();
-    crate::register(&mut registry);
-    let failures = tagalong_conformance::check_all(&registry);
-    assert!(failures.is_empty(), "{failures:#?}");
+    tagalong_conformance::assert_conforms(crate::register);
 }
 
 proptest! {

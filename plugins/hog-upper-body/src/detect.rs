@@ -241,7 +241,7 @@ mod tests {
 
     use nalgebra::{Point3, SMatrix, Vector2};
     use tagalong_core::{EgoMotion, Estimate, GreyImage, Images, Person, Stamp, Track, TrackId};
-    use tagalong_geometry::{Distortion, HEAD_RADIUS_M, Pinhole};
+    use tagalong_geometry::{HEAD_RADIUS_M, Pinhole};
 
     use super::*;
 
@@ -259,9 +259,7 @@ mod tests {
     }
 
     fn camera() -> Camera {
-        let lens =
-            Pinhole { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
-        Camera::mounted(lens, 640, 480, 1.3, 0.0, 0.0)
+        Camera::mounted(Pinhole::centred(525.0, 640, 480), 640, 480, 1.3, 0.0, 0.0)
     }
 
     #[test]
@@ -354,9 +352,8 @@ mod tests {
     /// Returns the numbers of windows that are rejected by depth and by gradients in a frame of
     /// noise, and the number of detections.
     fn dropped(config: Config, depth_m: Option<f32>, near: Option<&Track>) -> ([u64; 2], usize) {
-        let lens =
-            Pinhole { fx: 131.0, fy: 131.0, cx: 79.5, cy: 59.5, distortion: Distortion::None };
-        let camera = Arc::new(Camera::mounted(lens, 160, 120, 1.3, 0.0, 0.0));
+        let camera =
+            Arc::new(Camera::mounted(Pinhole::centred(131.0, 160, 120), 160, 120, 1.3, 0.0, 0.0));
         let grey = GreyImage::from_fn(160, 120, |x, y| (x * x * 31 + y * y * 17 + x * y) as u8);
         let images = Images {
             grey: Some(Arc::new(grey)),

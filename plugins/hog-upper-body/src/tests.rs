@@ -1,5 +1,4 @@
 use proptest::prelude::*;
-use tagalong_config::Registry;
 use tagalong_core::GreyImage;
 use tagalong_geometry::Rect;
 use tagalong_math::{RandomSource, XorShift64};
@@ -21,10 +20,7 @@ fn noise(width: usize, height: usize, seed: u64) -> GreyImage {
 
 #[test]
 fn it_conforms() {
-    let mut registry = Registry::default();
-    crate::register(&mut registry);
-    let failures = tagalong_conformance::check_all(&registry);
-    assert!(failures.is_empty(), "{failures:#?}");
+    tagalong_conformance::assert_conforms(crate::register);
 }
 
 /// Histogram of one cell, gradient by gradient, over the whole image.

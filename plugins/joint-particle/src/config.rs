@@ -1,7 +1,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_config::check_settings;
-use tagalong_core::Result;
+use tagalong_core::{Result, settings};
 
 use crate::sampling::Sampling;
 
@@ -34,151 +34,113 @@ pub enum Chosen {
     Spread,
 }
 
-/// Settings of the filter `joint-particle`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Config {
-    /// Method for people with overlapping silhouettes.
-    pub method: Method,
-    /// Number of particles of a single person.
-    #[schemars(range(min = 1, max = 100000))]
-    pub particles: usize,
-    /// `all`, `table`, `kde`, `gp`: number of particles of each of two people that are combined
-    /// with each other, all with all: 25 make 625.
-    #[schemars(range(min = 1, max = 300))]
-    pub joint_side: usize,
-    /// `partitioned`: most particles of a group; their number follows from their spread (KLD
-    /// sampling) ...
-    #[schemars(range(min = 1, max = 100000))]
-    pub max_particles: usize,
-    /// ... so that the error of their distribution stays below this, nats, ...
-    #[schemars(range(min = 1e-6, max = 10.0))]
-    pub kld_error: f64,
-    /// ... with the probability of this normal quantile (2.33 is 99 %).
-    #[schemars(range(min = -10.0, max = 10.0))]
-    pub kld_quantile: f64,
-    /// Only the position across the viewing ray is sampled; depth, height and velocity are small
-    /// Kalman filters in each particle. Otherwise all are sampled.
-    pub marginalise: bool,
-    /// Spectral density of a person's white acceleration, m²/s³.
-    #[schemars(range(min = 0.0, max = 1e3))]
-    pub acceleration_noise: f64,
-    /// Standard deviation of the position on the floor, beside the motion by velocity, m per square
-    /// root of a second.
-    #[schemars(range(min = 0.0, max = 1e3))]
-    pub position_noise: f64,
-    /// Standard deviation of the height, m per square root of a second.
-    #[schemars(range(min = 0.0, max = 1e3))]
-    pub height_noise: f64,
-    /// Standard deviation of the velocity, beside the acceleration, m/s per square root of a
-    /// second.
-    #[schemars(range(min = 0.0, max = 1e3))]
-    pub velocity_noise: f64,
-    /// Variance of each velocity component of a new track, m²/s².
-    #[schemars(range(min = 0.0, max = 1e3))]
-    pub initial_velocity_variance: f64,
-    /// `table`, `kde`, `gp` with `marginalise = false`: two people that are weighed together keep
-    /// their depth and height, as if they moved across the view. The map contains no information
-    /// on them.
-    pub hold_depth: bool,
-    /// People face in the direction of the best of three templates. If false, or if all fit alike,
-    /// in the direction of the track's velocity; a standing person outside of groups faces by
-    /// the image in both cases.
-    pub facing_by_image: bool,
-    /// Part of the particles that is moved to the detection, 0 to 1.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub from_detection: f64,
-    /// A person is seen if the scene is more likely by this with the person than without, nats, ...
-    #[schemars(range(min = -1e6, max = 1e6))]
-    pub min_support: f64,
-    /// by this if a detector found the person in this very frame, ...
-    #[schemars(range(min = -1e6, max = 1e6))]
-    pub min_support_found: f64,
-    /// ... and by this if no detector found the person for longer than `trust_s`: furniture
-    /// explains a little of the image, a person most of it.
-    #[schemars(range(min = -1e6, max = 1e6))]
-    pub min_support_unfound: f64,
-    /// Time for which a silhouette without detections is trusted, s.
-    #[schemars(range(min = 0.0, max = 1e9))]
-    pub trust_s: f64,
-    /// Part of their size by which upper-body squares are enlarged before they are tested for
-    /// overlap.
-    #[schemars(range(min = 0.0, max = 10.0))]
-    pub inflate: f64,
-    /// People leave their group when they are farther from each other than this on the floor, m,
-    /// ...
-    #[schemars(range(min = 0.0, max = 100.0))]
-    pub split_m: f64,
-    /// ... and their squares have not overlapped in this many frames in a row.
-    pub split_frames: u32,
-    /// `kde`, `gp`: number of particles that are compared with the image.
-    #[schemars(range(min = 1, max = 1000))]
-    pub points: usize,
-    /// `kde`, `gp`: selection of these particles.
-    pub chosen: Chosen,
-    /// Width of the kernel along the lateral position of the near person, m.
-    #[schemars(range(min = 1e-4, max = 10.0))]
-    pub kernel_near_m: f64,
-    /// Width of the kernel along the lateral position of the far person, m.
-    #[schemars(range(min = 1e-4, max = 10.0))]
-    pub kernel_far_m: f64,
-    /// `gp`: variance of the likelihood that the kernels do not explain.
-    #[schemars(range(min = 1e-9, max = 10.0))]
-    pub nugget: f64,
-    /// `table`: largest lateral position of the near person, m.
-    #[schemars(range(min = 0.0, max = 10.0))]
-    pub reach_near_m: f64,
-    /// `table`: largest lateral position of the far person, m.
-    #[schemars(range(min = 0.0, max = 10.0))]
-    pub reach_far_m: f64,
-    /// `table`: spacing of the positions, m.
-    #[schemars(range(min = 5e-3, max = 10.0))]
-    pub step_m: f64,
-    /// After people leave a group, their colours are compared with those before; they exchange
-    /// their tracks if that is more likely by this, in Bhattacharyya coefficients. 2 is never.
-    #[schemars(range(min = 0.0, max = 10.0))]
-    pub swap_margin: f64,
-    /// Scheme of sampling: of a program, not of a file.
-    #[serde(skip)]
-    pub sampling: Sampling,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self {
-            method: Method::Partitioned,
-            particles: 100,
-            joint_side: 25,
-            max_particles: 400,
-            kld_error: 0.05,
-            kld_quantile: 2.33,
-            marginalise: true,
-            acceleration_noise: 0.25,
-            position_noise: 0.05,
-            height_noise: 0.04,
-            velocity_noise: 0.0,
-            initial_velocity_variance: 1.0,
-            hold_depth: false,
-            facing_by_image: true,
-            from_detection: 0.1,
-            min_support: 2.0,
-            min_support_found: 0.0,
-            min_support_unfound: 6.0,
-            trust_s: 1.0,
-            inflate: 0.1,
-            split_m: 0.6,
-            split_frames: 3,
-            points: 50,
-            chosen: Chosen::Spread,
-            kernel_near_m: 0.04,
-            kernel_far_m: 0.1,
-            nugget: 0.03,
-            reach_near_m: 0.3,
-            reach_far_m: 0.9,
-            step_m: 0.03,
-            swap_margin: 0.3,
-            sampling: Sampling::default(),
-        }
+settings! {
+    /// Settings of the filter `joint-particle`.
+    pub struct Config {
+        /// Method for people with overlapping silhouettes.
+        pub method: Method = Method::Partitioned,
+        /// Number of particles of a single person.
+        #[schemars(range(min = 1, max = 100000))]
+        pub particles: usize = 100,
+        /// `all`, `table`, `kde`, `gp`: number of particles of each of two people that are combined
+        /// with each other, all with all: 25 make 625.
+        #[schemars(range(min = 1, max = 300))]
+        pub joint_side: usize = 25,
+        /// `partitioned`: most particles of a group; their number follows from their spread (KLD
+        /// sampling) ...
+        #[schemars(range(min = 1, max = 100000))]
+        pub max_particles: usize = 400,
+        /// ... so that the error of their distribution stays below this, nats, ...
+        #[schemars(range(min = 1e-6, max = 10.0))]
+        pub kld_error: f64 = 0.05,
+        /// ... with the probability of this normal quantile (2.33 is 99 %).
+        #[schemars(range(min = -10.0, max = 10.0))]
+        pub kld_quantile: f64 = 2.33,
+        /// Only the position across the viewing ray is sampled; depth, height and velocity are
+        /// small Kalman filters in each particle. Otherwise all are sampled.
+        pub marginalise: bool = true,
+        /// Spectral density of a person's white acceleration, m²/s³.
+        #[schemars(range(min = 0.0, max = 1e3))]
+        pub acceleration_noise: f64 = 0.25,
+        /// Standard deviation of the position on the floor, beside the motion by velocity, m per
+        /// square root of a second.
+        #[schemars(range(min = 0.0, max = 1e3))]
+        pub position_noise: f64 = 0.05,
+        /// Standard deviation of the height, m per square root of a second.
+        #[schemars(range(min = 0.0, max = 1e3))]
+        pub height_noise: f64 = 0.04,
+        /// Standard deviation of the velocity, beside the acceleration, m/s per square root of a
+        /// second.
+        #[schemars(range(min = 0.0, max = 1e3))]
+        pub velocity_noise: f64 = 0.0,
+        /// Variance of each velocity component of a new track, m²/s².
+        #[schemars(range(min = 0.0, max = 1e3))]
+        pub initial_velocity_variance: f64 = 1.0,
+        /// `table`, `kde`, `gp` with `marginalise = false`: two people that are weighed together
+        /// keep their depth and height, as if they moved across the view. The map contains no
+        /// information on them.
+        pub hold_depth: bool = false,
+        /// People face in the direction of the best of three templates. If false, or if all fit
+        /// alike, in the direction of the track's velocity; a standing person outside of groups
+        /// faces by the image in both cases.
+        pub facing_by_image: bool = true,
+        /// Part of the particles that is moved to the detection, 0 to 1.
+        #[schemars(range(min = 0.0, max = 1.0))]
+        pub from_detection: f64 = 0.1,
+        /// A person is seen if the scene is more likely by this with the person than without, nats,
+        /// ...
+        #[schemars(range(min = -1e6, max = 1e6))]
+        pub min_support: f64 = 2.0,
+        /// by this if a detector found the person in this very frame, ...
+        #[schemars(range(min = -1e6, max = 1e6))]
+        pub min_support_found: f64 = 0.0,
+        /// ... and by this if no detector found the person for longer than `trust_s`: furniture
+        /// explains a little of the image, a person most of it.
+        #[schemars(range(min = -1e6, max = 1e6))]
+        pub min_support_unfound: f64 = 6.0,
+        /// Time for which a silhouette without detections is trusted, s.
+        #[schemars(range(min = 0.0, max = 1e9))]
+        pub trust_s: f64 = 1.0,
+        /// Part of their size by which upper-body squares are enlarged before they are tested for
+        /// overlap.
+        #[schemars(range(min = 0.0, max = 10.0))]
+        pub inflate: f64 = 0.1,
+        /// People leave their group when they are farther from each other than this on the floor,
+        /// m, ...
+        #[schemars(range(min = 0.0, max = 100.0))]
+        pub split_m: f64 = 0.6,
+        /// ... and their squares have not overlapped in this many frames in a row.
+        pub split_frames: u32 = 3,
+        /// `kde`, `gp`: number of particles that are compared with the image.
+        #[schemars(range(min = 1, max = 1000))]
+        pub points: usize = 50,
+        /// `kde`, `gp`: selection of these particles.
+        pub chosen: Chosen = Chosen::Spread,
+        /// Width of the kernel along the lateral position of the near person, m.
+        #[schemars(range(min = 1e-4, max = 10.0))]
+        pub kernel_near_m: f64 = 0.04,
+        /// Width of the kernel along the lateral position of the far person, m.
+        #[schemars(range(min = 1e-4, max = 10.0))]
+        pub kernel_far_m: f64 = 0.1,
+        /// `gp`: variance of the likelihood that the kernels do not explain.
+        #[schemars(range(min = 1e-9, max = 10.0))]
+        pub nugget: f64 = 0.03,
+        /// `table`: largest lateral position of the near person, m.
+        #[schemars(range(min = 0.0, max = 10.0))]
+        pub reach_near_m: f64 = 0.3,
+        /// `table`: largest lateral position of the far person, m.
+        #[schemars(range(min = 0.0, max = 10.0))]
+        pub reach_far_m: f64 = 0.9,
+        /// `table`: spacing of the positions, m.
+        #[schemars(range(min = 5e-3, max = 10.0))]
+        pub step_m: f64 = 0.03,
+        /// After people leave a group, their colours are compared with those before; they exchange
+        /// their tracks if that is more likely by this, in Bhattacharyya coefficients. 2 is never.
+        #[schemars(range(min = 0.0, max = 10.0))]
+        pub swap_margin: f64 = 0.3,
+        /// Scheme of sampling: of a program, not of a file.
+        #[serde(skip)]
+        pub sampling: Sampling,
     }
 }
 

@@ -298,7 +298,7 @@ mod tests {
 
     use nalgebra::Matrix3;
     use tagalong_core::{Frame, Images, Likelihood, Matched, Stamp};
-    use tagalong_geometry::{Distortion, ImageBox, Pinhole, Rect};
+    use tagalong_geometry::{ImageBox, Pinhole, Rect};
 
     use super::*;
 
@@ -313,8 +313,8 @@ mod tests {
     }
 
     fn frame() -> Frame {
-        let lens = Pinhole { fx: 80.0, fy: 80.0, cx: 49.5, cy: 39.5, distortion: Distortion::None };
-        let camera = Arc::new(Camera::mounted(lens, 100, 80, 1.5, 0.0, 0.0));
+        let camera =
+            Arc::new(Camera::mounted(Pinhole::centred(80.0, 100, 80), 100, 80, 1.5, 0.0, 0.0));
         Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), Images::default())
     }
 

@@ -120,7 +120,7 @@ mod tests {
     use std::sync::Arc;
 
     use tagalong_core::{EgoMotion, Images, Stamp};
-    use tagalong_geometry::{Camera, Distortion, Pinhole};
+    use tagalong_geometry::{Camera, Pinhole};
 
     use super::*;
 
@@ -128,8 +128,8 @@ mod tests {
 
     /// Red on the left half of the image and blue on the right one, or mirrored.
     fn frame(mirrored: bool, with_colour: bool) -> Frame {
-        let lens = Pinhole { fx: 80.0, fy: 80.0, cx: 49.5, cy: 39.5, distortion: Distortion::None };
-        let camera = Arc::new(Camera::mounted(lens, 100, 80, 1.5, 0.0, 0.0));
+        let camera =
+            Arc::new(Camera::mounted(Pinhole::centred(80.0, 100, 80), 100, 80, 1.5, 0.0, 0.0));
         let image = RgbImage::from_fn(100, 80, |x, _| {
             if (x < 50) != mirrored { [200, 20, 20] } else { [20, 20, 200] }
         });

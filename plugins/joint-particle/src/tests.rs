@@ -6,8 +6,5 @@ pub(crate) mod rig;
 
 #[test]
 fn the_filter_conforms() {
-    let mut registry = tagalong_config::Registry::default();
-    crate::register(&mut registry);
-    let failures = tagalong_conformance::check_all(&registry);
-    assert!(failures.is_empty(), "{failures:#?}");
+    tagalong_conformance::assert_conforms(crate::register);
 }

@@ -1,7 +1,5 @@
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use tagalong_config::{OrAuto, check_settings};
-use tagalong_core::{Error, Result};
+use tagalong_core::{Error, Result, settings};
 use tagalong_network::{
     BoxOrder, BoxUnit, Choices, Colours, Family, Fit, LimitSettings, Preparation,
 };
@@ -21,82 +19,60 @@ pub(crate) struct Thresholds {
     pub track: f64,
 }
 
-/// Settings of `onnx`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Config {
-    /// ONNX file, relative to the config, or the name of an installed network
-    /// (`tagalong model --install`). Empty: no one is found, and the funnel says so.
-    pub model: String,
-    /// Family of the network: `auto` (by the file), `yolox`, `yolov8`, `yolov10`, `rt-detr`,
-    /// `rf-detr`, `nanodet`, `nanodet-m`, `rtmdet` or `movenet`.
-    pub family: OrAuto<Family>,
-    /// Columns and rows of the input where the file leaves them open, for example `[640, 640]`,
-    /// which is also taken for an empty list (256 x 256 for `movenet`).
-    pub size: Vec<usize>,
-    /// Classes of people; empty: those that the file calls person, pedestrian or people, and without
-    /// names that of the family (0, and 1 for `rf-detr`).
-    pub classes: Vec<usize>,
-    /// Unit of the boxes: `auto` (by the outputs), `pixels` of the input or `fractions` of its sides;
-    /// for `yolox`, `yolov8`, `yolov10`, `rt-detr` and `rtmdet`.
-    pub box_unit: OrAuto<BoxUnit>,
-    /// Order of the corners of a list of boxes: `auto` (`xyxy`, and refused if nearly all boxes of
-    /// people are wide), `xyxy` or `yxyx`; for `yolov10`.
-    pub box_order: OrAuto<BoxOrder>,
-    /// Probability from which a box is a new person; -1: that of the family. Below a half, scores
-    /// are log-odds above it, so that it also is what `start_score = 0.0` of a track manager means.
-    #[schemars(range(min = -1.0, max = 1.0))]
-    pub discover_score: f64,
-    /// Probability from which a box near a confirmed track is its person; -1: 0.4 times
-    /// `discover_score`.
-    #[schemars(range(min = -1.0, max = 1.0))]
-    pub track_score: f64,
-    /// Of two boxes that overlap by more than this (IoU) the less likely one is dropped; only for
-    /// families that leave it open (`yolox`, `yolov8`, `nanodet`, `nanodet-m`).
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub suppress_iou: f64,
-    /// Order of the channels: `auto` (that of the family), `rgb` or `bgr`.
-    pub colours: OrAuto<Colours>,
-    /// Place of the image in the input: `auto` (that of the family), `stretch`, `centre` or
-    /// `top-left`, the latter two with the aspect ratio of the image.
-    pub fit: OrAuto<Fit>,
-    /// Value of padded pixels, 0 to 255; -1: that of the family.
-    #[schemars(range(min = -1.0, max = 255.0))]
-    pub padding: f64,
-    /// Three means in the order of the channels, 0 to 255, which are subtracted from pixels; empty:
-    /// those of the family.
-    pub mean: Vec<f32>,
-    /// Three deviations in the order of the channels, by which they are divided; empty: those of
-    /// the family.
-    pub deviation: Vec<f32>,
-    /// Boxes to detections with a position.
-    #[serde(flatten)]
-    pub boxes: BoxSettings,
-    /// Limits of the network.
-    #[serde(flatten)]
-    pub limits: LimitSettings,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self {
-            model: String::new(),
-            family: OrAuto::Auto,
-            size: Vec::new(),
-            classes: Vec::new(),
-            box_unit: OrAuto::Auto,
-            box_order: OrAuto::Auto,
-            discover_score: BY_FAMILY,
-            track_score: BY_FAMILY,
-            suppress_iou: 0.6,
-            colours: OrAuto::Auto,
-            fit: OrAuto::Auto,
-            padding: -1.0,
-            mean: Vec::new(),
-            deviation: Vec::new(),
-            boxes: BoxSettings::default(),
-            limits: LimitSettings::default(),
-        }
+settings! {
+    /// Settings of `onnx`.
+    pub struct Config {
+        /// ONNX file, relative to the config, or the name of an installed network
+        /// (`tagalong model --install`). Empty: no one is found, and the funnel says so.
+        pub model: String,
+        /// Family of the network: `auto` (by the file), `yolox`, `yolov8`, `yolov10`, `rt-detr`,
+        /// `rf-detr`, `nanodet`, `nanodet-m`, `rtmdet` or `movenet`.
+        pub family: OrAuto<Family> = OrAuto::Auto,
+        /// Columns and rows of the input where the file leaves them open, for example `[640, 640]`,
+        /// which is also taken for an empty list (256 x 256 for `movenet`).
+        pub size: Vec<usize>,
+        /// Classes of people; empty: those that the file calls person, pedestrian or people, and
+        /// without names that of the family (0, and 1 for `rf-detr`).
+        pub classes: Vec<usize>,
+        /// Unit of the boxes: `auto` (by the outputs), `pixels` of the input or `fractions` of its
+        /// sides; for `yolox`, `yolov8`, `yolov10`, `rt-detr` and `rtmdet`.
+        pub box_unit: OrAuto<BoxUnit> = OrAuto::Auto,
+        /// Order of the corners of a list of boxes: `auto` (`xyxy`, and refused if nearly all boxes
+        /// of people are wide), `xyxy` or `yxyx`; for `yolov10`.
+        pub box_order: OrAuto<BoxOrder> = OrAuto::Auto,
+        /// Probability from which a box is a new person; -1: that of the family. Below a half,
+        /// scores are log-odds above it, so that it also is what `start_score = 0.0` of a track
+        /// manager means.
+        #[schemars(range(min = -1.0, max = 1.0))]
+        pub discover_score: f64 = BY_FAMILY,
+        /// Probability from which a box near a confirmed track is its person; -1: 0.4 times
+        /// `discover_score`.
+        #[schemars(range(min = -1.0, max = 1.0))]
+        pub track_score: f64 = BY_FAMILY,
+        /// Of two boxes that overlap by more than this (IoU) the less likely one is dropped; only
+        /// for families that leave it open (`yolox`, `yolov8`, `nanodet`, `nanodet-m`).
+        #[schemars(range(min = 0.0, max = 1.0))]
+        pub suppress_iou: f64 = 0.6,
+        /// Order of the channels: `auto` (that of the family), `rgb` or `bgr`.
+        pub colours: OrAuto<Colours> = OrAuto::Auto,
+        /// Place of the image in the input: `auto` (that of the family), `stretch`, `centre` or
+        /// `top-left`, the latter two with the aspect ratio of the image.
+        pub fit: OrAuto<Fit> = OrAuto::Auto,
+        /// Value of padded pixels, 0 to 255; -1: that of the family.
+        #[schemars(range(min = -1.0, max = 255.0))]
+        pub padding: f64 = -1.0,
+        /// Three means in the order of the channels, 0 to 255, which are subtracted from pixels;
+        /// empty: those of the family.
+        pub mean: Vec<f32>,
+        /// Three deviations in the order of the channels, by which they are divided; empty: those
+        /// of the family.
+        pub deviation: Vec<f32>,
+        /// Boxes to detections with a position.
+        #[serde(flatten)]
+        pub boxes: BoxSettings,
+        /// Limits of the network.
+        #[serde(flatten)]
+        pub limits: LimitSettings,
     }
 }
 

@@ -2,12 +2,12 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use nalgebra::{Matrix5, Vector2, Vector3};
-use tagalong_config::{Context, OrAuto, Registry, parse_settings};
+use tagalong_config::{Context, OrAuto, parse_settings};
 use tagalong_core::{
     Capabilities, DepthImage, Detection, Detector, DiffDrive, EgoMotion, Estimate, Frame, Funnel,
     GreyImage, Images, Person, Query, RgbImage, Stamp, Track, TrackId,
 };
-use tagalong_geometry::{Camera, Distortion, Extent, HEAD_RADIUS_M, Pinhole, Rect};
+use tagalong_geometry::{Camera, Extent, HEAD_RADIUS_M, Pinhole, Rect};
 use tagalong_network::{Colours, Family, Fit, LimitSettings};
 use tagalong_vision::{BoxSettings, BoxedBody};
 
@@ -64,8 +64,7 @@ fn detector(config: Config) -> Onnx {
 }
 
 fn camera() -> Arc<Camera> {
-    let lens = Pinhole { fx: 300.0, fy: 300.0, cx: 191.5, cy: 191.5, distortion: Distortion::None };
-    Arc::new(Camera::mounted(lens, 384, 384, 1.0, 0.0, 0.0))
+    Arc::new(Camera::mounted(Pinhole::centred(300.0, 384, 384), 384, 384, 1.0, 0.0, 0.0))
 }
 
 /// Returns an image with a blob of this brightness in place of the body.
@@ -91,10 +90,7 @@ fn detect(detector: &mut Onnx, frame: &Frame) -> Vec<Detection> {
 
 #[test]
 fn it_conforms() {
-    let mut registry = Registry::default();
-    register(&mut registry);
-    let failures = tagalong_conformance::check_all(&registry);
-    assert!(failures.is_empty(), "{failures:#?}");
+    tagalong_conformance::assert_conforms(register);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_config::check_settings;
-use tagalong_core::{Error, Result};
+use tagalong_core::{Error, Result, settings};
 use tagalong_vision::{BoxSettings, log_odds_of};
 
 /// Meaning of the recorded score.
@@ -14,43 +14,30 @@ pub enum ScoreScale {
     LogOdds,
 }
 
-/// Settings of `recorded-detections`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Config {
-    /// A `det.txt` of the MOTChallenge (frame, -1, x, y, width, height, score; frames from 1,
-    /// pixels), relative to the config. Empty: the log topic that `[input] detections_topic` names.
-    pub path: String,
-    /// Boxes with a lower score, on the recorded scale, are dropped.
-    pub min_score: f64,
-    /// Score, on the recorded scale, from which a box may be a new person; less certain ones continue
-    /// tracks alone. Scores of detections are log-odds above it. By default `min_score`, or even odds
-    /// (a probability of a half) where that is less.
-    pub discover_score: Option<f64>,
-    /// Meaning of the score.
-    pub score: ScoreScale,
-    /// Boxes to detections with a position.
-    #[serde(flatten)]
-    pub boxes: BoxSettings,
-    /// Standard deviation of a recorded position in space, m.
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub sigma_position_m: f64,
-    /// Keep recorded places that are outside of the image, without a box: those of a detector that
-    /// sees more than the camera.
-    pub outside_image: bool,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self {
-            path: String::new(),
-            min_score: 0.3,
-            discover_score: None,
-            score: ScoreScale::Probability,
-            boxes: BoxSettings::default(),
-            sigma_position_m: 0.15,
-            outside_image: false,
-        }
+settings! {
+    /// Settings of `recorded-detections`.
+    pub struct Config {
+        /// A `det.txt` of the MOTChallenge (frame, -1, x, y, width, height, score; frames from 1,
+        /// pixels), relative to the config. Empty: the log topic that `[input] detections_topic`
+        /// names.
+        pub path: String,
+        /// Boxes with a lower score, on the recorded scale, are dropped.
+        pub min_score: f64 = 0.3,
+        /// Score, on the recorded scale, from which a box may be a new person; less certain ones
+        /// continue tracks alone. Scores of detections are log-odds above it. By default
+        /// `min_score`, or even odds (a probability of a half) where that is less.
+        pub discover_score: Option<f64>,
+        /// Meaning of the score.
+        pub score: ScoreScale = ScoreScale::Probability,
+        /// Boxes to detections with a position.
+        #[serde(flatten)]
+        pub boxes: BoxSettings,
+        /// Standard deviation of a recorded position in space, m.
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        pub sigma_position_m: f64 = 0.15,
+        /// Keep recorded places that are outside of the image, without a box: those of a detector
+        /// that sees more than the camera.
+        pub outside_image: bool = false,
     }
 }
 

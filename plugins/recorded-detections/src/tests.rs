@@ -1,12 +1,12 @@
 use std::sync::Arc;
 
 use nalgebra::{Matrix5, Point3, Vector2};
-use tagalong_config::{Context, Registry};
+use tagalong_config::Context;
 use tagalong_core::{
     DepthImage, Detection, Detector, DiffDrive, EgoMotion, Estimate, ExternalDetection, Frame,
     Funnel, Images, Input, Person, Query, Stamp, Track, TrackId,
 };
-use tagalong_geometry::{Camera, Distortion, Extent, HEAD_RADIUS_M, Pinhole, Rect};
+use tagalong_geometry::{Camera, Extent, HEAD_RADIUS_M, Pinhole, Rect};
 use tagalong_vision::{BoxSettings, BoxedBody};
 
 use super::*;
@@ -14,8 +14,7 @@ use super::*;
 const EVERYWHERE: Query<'_> = Query::Discover { occupied: &[] };
 
 fn camera() -> Arc<Camera> {
-    let lens = Pinhole { fx: 520.0, fy: 520.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
-    Arc::new(Camera::mounted(lens, 640, 480, 1.4, 0.0, 0.0))
+    Arc::new(Camera::mounted(Pinhole::centred(520.0, 640, 480), 640, 480, 1.4, 0.0, 0.0))
 }
 
 fn frame(index: u64, depth_m: Option<f32>) -> Frame {
@@ -78,10 +77,7 @@ fn whole_body(head: Point3<f64>) -> String {
 
 #[test]
 fn it_conforms() {
-    let mut registry = Registry::default();
-    register(&mut registry);
-    let failures = tagalong_conformance::check_all(&registry);
-    assert!(failures.is_empty(), "{failures:#?}");
+    tagalong_conformance::assert_conforms(register);
 }
 
 #[test]

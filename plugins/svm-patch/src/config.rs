@@ -1,5 +1,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tagalong_core::settings;
 
 /// Normalisation of the grey values of a patch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -21,66 +22,44 @@ pub enum Scaling {
     Raw,
 }
 
-/// Settings of `svm-patch`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Config {
-    /// Model file, relative to the config; empty: the built-in model.
-    pub model: String,
-    /// Weight of this verifier's log-odds relative to the detector's score.
-    pub weight: f64,
-    /// Log-odds of one frame are limited to plus and minus this: a single patch never decides
-    /// alone.
-    pub limit: f64,
-    /// Settings of the fit; only `tagalong train` reads them.
-    pub training: Training,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self { model: String::new(), weight: 1.0, limit: 6.0, training: Training::default() }
+settings! {
+    /// Settings of `svm-patch`.
+    pub struct Config {
+        /// Model file, relative to the config; empty: the built-in model.
+        pub model: String,
+        /// Weight of this verifier's log-odds relative to the detector's score.
+        pub weight: f64 = 1.0,
+        /// Log-odds of one frame are limited to plus and minus this: a single patch never decides
+        /// alone.
+        pub limit: f64 = 6.0,
+        /// Settings of the fit; only `tagalong train` reads them.
+        pub training: Training,
     }
 }
 
-/// Settings of the fit. Those needed at run time are stored in the model file.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Training {
-    /// Normalisation of the grey values: `unit`, `gradients`, `fraction` or `raw`.
-    pub scaling: Scaling,
-    /// Fraction of its side by which a candidate's square is enlarged.
-    pub grow: f64,
-    /// Widths of the kernel `exp(-gamma |a - b|^2)` to try.
-    pub gammas: Vec<f64>,
-    /// Penalties of a training error to try; each class is weighted by the inverse of its share.
-    pub penalties: Vec<f64>,
-    /// Number of parts into which the groups are divided; each is held out once.
-    pub folds: usize,
-    /// Most examples in the cross-validation.
-    pub max_tried: usize,
-    /// Most examples in the final fit; memory grows with the square.
-    pub max_samples: usize,
-    /// Most support vectors in the model file; each takes half a kilobyte.
-    pub max_vectors: usize,
-    /// Most examples of people, sampled at random; 0: all.
-    pub people: usize,
-    /// Most examples of other objects, sampled at random; 0: all.
-    pub others: usize,
-}
-
-impl Default for Training {
-    fn default() -> Self {
-        Self {
-            scaling: Scaling::Gradients,
-            grow: 0.1,
-            gammas: vec![0.5, 1.0, 2.0, 4.0, 8.0],
-            penalties: vec![0.3, 1.0, 3.0, 10.0],
-            folds: 4,
-            max_tried: 1000,
-            max_samples: 4000,
-            max_vectors: 1200,
-            people: 0,
-            others: 0,
-        }
+settings! {
+    /// Settings of the fit. Those needed at run time are stored in the model file.
+    pub struct Training {
+        /// Normalisation of the grey values: `unit`, `gradients`, `fraction` or `raw`.
+        pub scaling: Scaling = Scaling::Gradients,
+        /// Fraction of its side by which a candidate's square is enlarged.
+        pub grow: f64 = 0.1,
+        /// Widths of the kernel `exp(-gamma |a - b|^2)` to try.
+        pub gammas: Vec<f64> = vec![0.5, 1.0, 2.0, 4.0, 8.0],
+        /// Penalties of a training error to try; each class is weighted by the inverse of its
+        /// share.
+        pub penalties: Vec<f64> = vec![0.3, 1.0, 3.0, 10.0],
+        /// Number of parts into which the groups are divided; each is held out once.
+        pub folds: usize = 4,
+        /// Most examples in the cross-validation.
+        pub max_tried: usize = 1000,
+        /// Most examples in the final fit; memory grows with the square.
+        pub max_samples: usize = 4000,
+        /// Most support vectors in the model file; each takes half a kilobyte.
+        pub max_vectors: usize = 1200,
+        /// Most examples of people, sampled at random; 0: all.
+        pub people: usize = 0,
+        /// Most examples of other objects, sampled at random; 0: all.
+        pub others: usize = 0,
     }
 }

@@ -7,10 +7,8 @@
 use std::f64::consts::PI;
 
 use nalgebra::{Point2, Vector2};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use tagalong_config::Registry;
-use tagalong_core::Twist;
+use tagalong_core::{Twist, settings};
 
 use super::obstacles::{PERSON_M, others, readings};
 use super::planner::{Planner, Situation, Steering};
@@ -33,37 +31,25 @@ const LEAST_M: f64 = 1e-6;
 /// Cost of a drive that begins in a collision.
 const COLLISION: f64 = 1e6;
 
-/// Settings of the controller `follow-bench-dwa`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Config {
-    /// Distance kept from the surface of the person, m.
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub distance_m: f64,
-    /// Radius of the robot, m.
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub radius_m: f64,
-    /// Largest acceleration, m/s².
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub max_acceleration: f64,
-    /// Largest angular acceleration, rad/s².
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub max_angular_acceleration: f64,
-    /// Largest turn rate, rad/s.
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub max_turn_rate: f64,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self {
-            distance_m: 1.5,
-            // Half of the diagonal of 0.7 by 0.55 m.
-            radius_m: 0.445,
-            max_acceleration: 2.0,
-            max_angular_acceleration: PI,
-            max_turn_rate: PI,
-        }
+settings! {
+    /// Settings of the controller `follow-bench-dwa`.
+    pub struct Config {
+        /// Distance kept from the surface of the person, m.
+        #[schemars(range(min = 0.0, max = 1e6))]
+        pub distance_m: f64 = 1.5,
+        /// Radius of the robot, m.
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        // Half of the diagonal of 0.7 by 0.55 m.
+        pub radius_m: f64 = 0.445,
+        /// Largest acceleration, m/s².
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        pub max_acceleration: f64 = 2.0,
+        /// Largest angular acceleration, rad/s².
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        pub max_angular_acceleration: f64 = PI,
+        /// Largest turn rate, rad/s.
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        pub max_turn_rate: f64 = PI,
     }
 }
 

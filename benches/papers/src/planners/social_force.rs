@@ -4,10 +4,8 @@
 //! velocity that results is turned into a turn towards it and a speed along the heading.
 
 use nalgebra::{Point2, Vector2};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use tagalong_config::Registry;
-use tagalong_core::Twist;
+use tagalong_core::{Twist, settings};
 
 use super::obstacles::{centres, others, readings};
 use super::planner::{Planner, Situation, Steering};
@@ -30,21 +28,15 @@ const STRAIGHT_RAD: f64 = 0.1;
 /// Speed below which the robot stands, m/s.
 const STANDS_MPS: f64 = 0.02;
 
-/// Settings of the controller `follow-bench-sfm`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Config {
-    /// Distance kept from the centre of the person, m.
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub distance_m: f64,
-    /// Radius of the robot, m.
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub radius_m: f64,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self { distance_m: 1.5, radius_m: 0.445 }
+settings! {
+    /// Settings of the controller `follow-bench-sfm`.
+    pub struct Config {
+        /// Distance kept from the centre of the person, m.
+        #[schemars(range(min = 0.0, max = 1e6))]
+        pub distance_m: f64 = 1.5,
+        /// Radius of the robot, m.
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        pub radius_m: f64 = 0.445,
     }
 }
 

@@ -4,53 +4,37 @@
 //! robot at rest cannot turn, and a person behind the robot is driven away from.
 
 use nalgebra::Vector2;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use tagalong_config::{Registry, check_settings};
 use tagalong_controllers::{CommandHistory, coasting_weight, step_s};
-use tagalong_core::{Controller, Result, Scene, Twist, WheelSpeeds};
+use tagalong_core::{Controller, Result, Scene, Twist, WheelSpeeds, settings};
 
 /// Above this no length or speed on the floor makes sense, whatever the unit.
 const MOST: f64 = 1e6;
 
-/// Settings of the controller `arc-follow-as-printed`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Config {
-    /// Divisor of the radius of the circle (k); 1 is path A, more is path C.
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub path_gain: f64,
-    /// Distance kept from the person, m, of which the papers say nothing.
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub stand_off_m: f64,
-    /// Speed for each metre beyond the stand-off, 1/s, likewise.
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub range_gain_per_s: f64,
-    /// Largest acceleration, m/s².
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub max_acceleration: f64,
-    /// Largest deceleration, m/s².
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub max_deceleration: f64,
-    /// Time after which the robot stands still when the person is not seen, s.
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub max_unseen_s: f64,
-    /// Time from the capture of an image until the wheels answer to it, s.
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub latency_s: f64,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self {
-            path_gain: 2.0,
-            stand_off_m: 1.4,
-            range_gain_per_s: 0.8,
-            max_acceleration: 0.5,
-            max_deceleration: 1.0,
-            max_unseen_s: 1.0,
-            latency_s: 0.1,
-        }
+settings! {
+    /// Settings of the controller `arc-follow-as-printed`.
+    pub struct Config {
+        /// Divisor of the radius of the circle (k); 1 is path A, more is path C.
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        pub path_gain: f64 = 2.0,
+        /// Distance kept from the person, m, of which the papers say nothing.
+        #[schemars(range(min = 0.0, max = 1e6))]
+        pub stand_off_m: f64 = 1.4,
+        /// Speed for each metre beyond the stand-off, 1/s, likewise.
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        pub range_gain_per_s: f64 = 0.8,
+        /// Largest acceleration, m/s².
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        pub max_acceleration: f64 = 0.5,
+        /// Largest deceleration, m/s².
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        pub max_deceleration: f64 = 1.0,
+        /// Time after which the robot stands still when the person is not seen, s.
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        pub max_unseen_s: f64 = 1.0,
+        /// Time from the capture of an image until the wheels answer to it, s.
+        #[schemars(range(min = 0.0, max = 1e6))]
+        pub latency_s: f64 = 0.1,
     }
 }
 

@@ -8,7 +8,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_config::{Registry, check_settings};
-use tagalong_core::Result;
+use tagalong_core::{Result, settings};
 use tagalong_depth_template::{DepthTemplate, DepthTemplateConfig};
 
 use super::dissimilarity::PrintedComparison;
@@ -26,37 +26,26 @@ pub enum Weighing {
     Rms,
 }
 
-/// Settings of the detector `depth-template-as-printed`, beside those of `depth-template`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Config {
-    /// As P4 prints it: the plain sum of the squared differences of depth over the window, against
-    /// the depth of the face and one background depth (`background_percentile` of the frame), m².
-    /// `cost` is not asked then, and all costs are in m².
-    pub dissimilarity: bool,
-    /// Weighing of imagined scenes.
-    pub weighing: Weighing,
-    /// Standard deviation of the dissimilarity of a scene that is as imagined, for the weighings
-    /// `printed` and `rms`, m. P3 sets it "experientially".
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub likelihood_sigma: f64,
-    /// For the weighings `printed` and `rms`: all scenes are compared in one window, the whole image,
-    /// and not each in the window around its people. P3 does not say which window it takes.
-    pub whole_image: bool,
-    /// Settings of `depth-template`.
-    #[serde(flatten)]
-    pub base: DepthTemplateConfig,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self {
-            dissimilarity: false,
-            weighing: Weighing::Printed,
-            likelihood_sigma: 0.005,
-            whole_image: false,
-            base: DepthTemplateConfig::default(),
-        }
+settings! {
+    /// Settings of the detector `depth-template-as-printed`, beside those of `depth-template`.
+    pub struct Config {
+        /// As P4 prints it: the plain sum of the squared differences of depth over the window,
+        /// against the depth of the face and one background depth (`background_percentile` of the
+        /// frame), m². `cost` is not asked then, and all costs are in m².
+        pub dissimilarity: bool = false,
+        /// Weighing of imagined scenes.
+        pub weighing: Weighing = Weighing::Printed,
+        /// Standard deviation of the dissimilarity of a scene that is as imagined, for the
+        /// weighings `printed` and `rms`, m. P3 sets it "experientially".
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        pub likelihood_sigma: f64 = 0.005,
+        /// For the weighings `printed` and `rms`: all scenes are compared in one window, the whole
+        /// image, and not each in the window around its people. P3 does not say which window it
+        /// takes.
+        pub whole_image: bool = false,
+        /// Settings of `depth-template`.
+        #[serde(flatten)]
+        pub base: DepthTemplateConfig,
     }
 }
 
@@ -101,7 +90,7 @@ mod tests {
         DepthImage, Detection, Detector as _, EgoMotion, Frame, Funnel, Images, Query, Stamp,
     };
     use tagalong_depth_template::render;
-    use tagalong_geometry::{Camera, Distortion, Pinhole};
+    use tagalong_geometry::{Camera, Pinhole};
 
     use super::*;
 
@@ -111,8 +100,14 @@ mod tests {
     /// A person on a floor in front of a wall.
     fn frame() -> Frame {
         let f = 0.83 * 640.0;
-        let lens = Pinhole { fx: f, fy: f, cx: 319.5, cy: 239.5, distortion: Distortion::None };
-        let camera = Arc::new(Camera::mounted(lens, 640, 480, CAMERA_HEIGHT_M, 0.0, 0.0));
+        let camera = Arc::new(Camera::mounted(
+            Pinhole::centred(f, 640, 480),
+            640,
+            480,
+            CAMERA_HEIGHT_M,
+            0.0,
+            0.0,
+        ));
         let body = render(std::f64::consts::PI, 0.0);
         let depth = DepthImage::from_fn(640, 480, |u, v| {
             let ray = camera.ray(Point2::new(u as f64, v as f64));

@@ -6,50 +6,36 @@
 //! `P - K H P`, which loses symmetry.
 
 use nalgebra::{Matrix2, Matrix3, Matrix5, SMatrix, Vector5};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use tagalong_config::{Registry, check_settings};
-use tagalong_core::{Detection, EgoMotion, Estimate, PerPerson, PersonFilter, Result, Update};
+use tagalong_core::{
+    Detection, EgoMotion, Estimate, PerPerson, PersonFilter, Result, Update, settings,
+};
 use tagalong_filters::ekf::{Ekf, State};
 use tagalong_geometry::Camera;
 
 /// A coordinate with a larger variance, m², was not measured.
 const UNMEASURED_M2: f64 = 100.0;
 
-/// Settings of the filter `ekf-as-printed`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Config {
-    /// The speed of the robot is subtracted from the velocity; `false`: corrected.
-    pub velocity: bool,
-    /// Noise enters the velocity alone; `false`: corrected.
-    pub noise: bool,
-    /// The covariance is `P - K H P`; `false`: corrected, the Joseph form.
-    pub update: bool,
-    /// All detections have the same variance; `false`: corrected, their own.
-    pub measurement: bool,
-    /// Standard deviation of the process noise, m/s².
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub sigma_w: f64,
-    /// Standard deviation of the measurement noise, m.
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub sigma_v_m: f64,
-    /// Variance of each velocity component of a new track, m²/s².
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub initial_velocity_variance: f64,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self {
-            velocity: true,
-            noise: true,
-            update: true,
-            measurement: true,
-            sigma_w: 1.0,
-            sigma_v_m: 0.05,
-            initial_velocity_variance: 2.0,
-        }
+settings! {
+    /// Settings of the filter `ekf-as-printed`.
+    pub struct Config {
+        /// The speed of the robot is subtracted from the velocity; `false`: corrected.
+        pub velocity: bool = true,
+        /// Noise enters the velocity alone; `false`: corrected.
+        pub noise: bool = true,
+        /// The covariance is `P - K H P`; `false`: corrected, the Joseph form.
+        pub update: bool = true,
+        /// All detections have the same variance; `false`: corrected, their own.
+        pub measurement: bool = true,
+        /// Standard deviation of the process noise, m/s².
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        pub sigma_w: f64 = 1.0,
+        /// Standard deviation of the measurement noise, m.
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        pub sigma_v_m: f64 = 0.05,
+        /// Variance of each velocity component of a new track, m²/s².
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        pub initial_velocity_variance: f64 = 2.0,
     }
 }
 
@@ -171,7 +157,7 @@ pub fn register(registry: &mut Registry) {
 mod tests {
     use nalgebra::{Isometry2, Point2, Point3, Rotation2, Vector2, Vector3};
     use tagalong_core::DiffDrive;
-    use tagalong_geometry::{Distortion, ImageBox, Pinhole, Rect};
+    use tagalong_geometry::{ImageBox, Pinhole, Rect};
     use tagalong_math::{RandomSource as _, SplitMix64};
 
     use super::*;
@@ -182,9 +168,7 @@ mod tests {
     const SEEDS: u64 = 40;
 
     fn camera() -> Camera {
-        let lens =
-            Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
-        Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0)
+        Camera::mounted(Pinhole::centred(500.0, 640, 480), 640, 480, 1.2, 0.0, 0.0)
     }
 
     fn detection(position: Point3<f64>, sigma_m: f64) -> Detection {

@@ -6,46 +6,32 @@
 //! the paper used.
 
 use nalgebra::{Vector2, Vector5};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use tagalong_config::{Registry, check_settings};
-use tagalong_core::Result;
+use tagalong_core::{Result, settings};
 use tagalong_joint_particle::{
     JointParticle, Random, Sampling, SamplingSteps, heaviest, systematic,
 };
 
-/// Settings of the filter `joint-particle-as-printed`, beside those of `joint-particle`. Each of
-/// them is true as printed, and corrects one misprint where it is false.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Config {
-    /// Kernels with 2 sigma in place of 2 sigma², in millimetres.
-    pub printed_kernel: bool,
-    /// Lateral positions along the robot's Y axis instead of across the viewing ray.
-    pub printed_axes: bool,
-    /// All people of a group are moved by the same noise.
-    pub shared_noise: bool,
-    /// The most likely particles are kept when groups form and part, instead of resampling from all.
-    pub top: bool,
-    /// As in OpenCV's ConDensation: resampling in every frame without a random offset, uniform noise
-    /// from generators with the same seeds for every track, and the prediction reported as the
-    /// estimate.
-    pub condensation: bool,
-    /// Settings of `joint-particle`.
-    #[serde(flatten)]
-    pub base: tagalong_joint_particle::Config,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self {
-            printed_kernel: true,
-            printed_axes: true,
-            shared_noise: true,
-            top: true,
-            condensation: true,
-            base: tagalong_joint_particle::Config::default(),
-        }
+settings! {
+    /// Settings of the filter `joint-particle-as-printed`, beside those of `joint-particle`. Each
+    /// of them is true as printed, and corrects one misprint where it is false.
+    pub struct Config {
+        /// Kernels with 2 sigma in place of 2 sigma², in millimetres.
+        pub printed_kernel: bool = true,
+        /// Lateral positions along the robot's Y axis instead of across the viewing ray.
+        pub printed_axes: bool = true,
+        /// All people of a group are moved by the same noise.
+        pub shared_noise: bool = true,
+        /// The most likely particles are kept when groups form and part, instead of resampling from
+        /// all.
+        pub top: bool = true,
+        /// As in OpenCV's ConDensation: resampling in every frame without a random offset, uniform
+        /// noise from generators with the same seeds for every track, and the prediction reported
+        /// as the estimate.
+        pub condensation: bool = true,
+        /// Settings of `joint-particle`.
+        #[serde(flatten)]
+        pub base: tagalong_joint_particle::Config,
     }
 }
 

@@ -191,7 +191,7 @@ mod tests {
     use proptest::prelude::*;
     use tagalong_core::{DepthImage, EgoMotion, Images, Likelihood, Person, Stamp};
     use tagalong_depth_template::{Bank, DepthTemplateConfig, Direction, Pose, Template, Weigher};
-    use tagalong_geometry::{Camera, Distortion, Pinhole};
+    use tagalong_geometry::{Camera, Pinhole};
 
     use super::*;
 
@@ -199,8 +199,7 @@ mod tests {
     const WALL_M: f32 = 5.0;
 
     fn camera() -> Camera {
-        let lens = Pinhole { fx: 80.0, fy: 80.0, cx: 39.5, cy: 29.5, distortion: Distortion::None };
-        Camera::mounted(lens, 80, 60, HEIGHT_M, 0.0, 0.0)
+        Camera::mounted(Pinhole::centred(80.0, 80, 60), 80, 60, HEIGHT_M, 0.0, 0.0)
     }
 
     fn frame(depth: DepthImage) -> Frame {

@@ -6,7 +6,7 @@ use std::process::Output;
 
 use tagalong_log::{FrameSource, InputSettings, Inputs, Limits, LogFrame};
 
-use crate::common::{Drawn, code, tagalong, text};
+use crate::common::{Drawn, code, messages_of, results_of, tagalong, text};
 
 fn alter(folder: &Path, arguments: &[&str]) -> Output {
     tagalong().current_dir(folder).arg("alter").args(arguments).output().unwrap()
@@ -31,9 +31,8 @@ fn home() -> tempfile::TempDir {
 #[test]
 fn every_third_frame_is_kept_with_its_truth() {
     let folder = home();
-    let done = alter(folder.path(), &["walk.mcap", "--every", "3"]);
-    assert_eq!(code(&done), 0, "{}", text(&done.stderr));
-    assert!(text(&done.stdout).contains("walk-altered.mcap: 4 frames"), "{}", text(&done.stdout));
+    let said = results_of(&alter(folder.path(), &["walk.mcap", "--every", "3"]));
+    assert!(said.contains("walk-altered.mcap: 4 frames"), "{said}");
     let all = frames(&folder.path().join("walk.mcap"));
     let kept = frames(&folder.path().join("walk-altered.mcap"));
     assert_eq!(kept.len(), 4);
@@ -101,9 +100,11 @@ fn the_truth_beside_a_copy_is_replaced_only_when_asked() {
     assert_eq!(code(&done), 0, "{}", text(&done.stderr));
     assert!(fs::read_to_string(&truth).unwrap().starts_with("frame,"));
     // The truth of this name is the log's own.
-    let own = alter(folder.path(), &["walk.mcap", "--mirror", "-o", "walk.bag", "--overwrite"]);
-    assert_eq!(code(&own), 2, "{}", text(&own.stderr));
-    assert!(text(&own.stderr).contains("replace the truth itself"), "{}", text(&own.stderr));
+    let said = messages_of(
+        &alter(folder.path(), &["walk.mcap", "--mirror", "-o", "walk.bag", "--overwrite"]),
+        2,
+    );
+    assert!(said.contains("replace the truth itself"), "{said}");
 }
 
 #[test]

@@ -6,7 +6,9 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use crate::common::{Drawn, code, config, own_plugin, people, tagalong, text, unread, write};
+use crate::common::{
+    Drawn, code, config, messages_of, own_plugin, people, tagalong, text, unread, write,
+};
 
 /// Content in place of a valid file. Opening a pipe without a writer would wait for ever; the sparse
 /// file has gigabytes.
@@ -298,9 +300,8 @@ fn lost_data_is_an_exit_code_of_every_command_that_reads_a_log() {
 
 #[test]
 fn without_a_command_the_usage_is_told() {
-    let output = tagalong().output().unwrap();
-    assert_eq!(code(&output), 2);
-    assert!(text(&output.stderr).contains("Usage"), "{}", text(&output.stderr));
+    let said = messages_of(&tagalong().output().unwrap(), 2);
+    assert!(said.contains("Usage"), "{said}");
 }
 
 #[test]
@@ -319,9 +320,8 @@ fn a_detector_without_a_model_is_a_failure_with_the_key_to_set() {
     fs::write(home.path().join("onnx.toml"), include_str!("../../../../configs/onnx.toml"))
         .unwrap();
     let arguments = ["run", "onnx.toml", "walk.mcap", "-o", "out"];
-    let output = tagalong().args(arguments).current_dir(home.path()).output().unwrap();
-    let told = text(&output.stderr);
-    assert_eq!(code(&output), 1, "{told}");
+    let told =
+        messages_of(&tagalong().args(arguments).current_dir(home.path()).output().unwrap(), 1);
     assert!(told.contains("has no model (`model`)") && told.contains("tagalong model"), "{told}");
 }
 
@@ -330,9 +330,10 @@ fn a_name_that_is_no_config_costs_no_simulation() {
     let home = tempfile::tempdir().unwrap();
     fs::write(home.path().join("walk.people.csv"), "frame,id\n").unwrap();
     for name in ["walk.people.csv", "none.toml"] {
-        let output = tagalong().args(["run", name]).current_dir(home.path()).output().unwrap();
-        let told = text(&output.stderr);
-        assert_eq!(code(&output), 2, "{told}");
+        let told = messages_of(
+            &tagalong().args(["run", name]).current_dir(home.path()).output().unwrap(),
+            2,
+        );
         assert!(
             !told.contains("two drawn people") && !told.contains("two simulated people"),
             "{told}"

@@ -8,7 +8,7 @@ use std::process::Output;
 
 use serde_json::Value;
 
-use crate::common::{Drawn, code, own_plugin, text};
+use crate::common::{Drawn, code, messages_of, own_plugin, results_of, text};
 
 /// The two logs and their truth, and a config or more.
 struct Home {
@@ -88,9 +88,7 @@ fn the_truth_of_another_log_is_noted_in_all_forms_of_the_report() {
     fs::remove_file(home.path("logs/long.people.csv")).unwrap();
     let corner: String = (1..=24).map(|n| format!("{n},1,0,0,9,20,1,1,1\n")).collect();
     fs::write(home.path("logs/long.boxes.csv"), corner).unwrap();
-    let output = home.bench(&["--logs-dir", "logs", "-o", "out"]);
-    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
-    let said = text(&output.stdout);
+    let said = results_of(&home.bench(&["--logs-dir", "logs", "-o", "out"]));
     let json = home.report("out")["notes"].to_string();
     let page = fs::read_to_string(home.path("out/report.html")).unwrap();
     for note in [
@@ -112,9 +110,14 @@ fn places_on_the_floor_are_truth_beside_a_log() {
     let header = "scan,id,x_laser_m,y_laser_m,x_robot_m,y_robot_m,ignore,source\n";
     let rows = "15,7,2.88,-0.18,2.88,-0.18,0,annotated\n19,7,2.88,-0.1,2.88,-0.1,0,annotated\n";
     fs::write(home.path("logs/long.people-floor.csv"), format!("{header}{rows}")).unwrap();
-    let output = home.bench(&["--logs-dir", "logs", "--configs", "configs/near.toml", "-o", "out"]);
-    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
-    let said = text(&output.stdout);
+    let said = results_of(&home.bench(&[
+        "--logs-dir",
+        "logs",
+        "--configs",
+        "configs/near.toml",
+        "-o",
+        "out",
+    ]));
     let (image, floor) = said.split_once("on the floor, as the truth has no boxes:\n").unwrap();
     assert!(image.contains(" short ") && !image.contains(" long "), "{said}");
     assert!(floor.lines().nth(1).unwrap().starts_with("near      long "), "{said}");
@@ -177,9 +180,8 @@ fn results_and_times_of_another_task_are_not_taken() {
         let copied = folder.join(format!("{second}.json"));
         fs::copy(folder.join(format!("{first}.json")), copied).unwrap();
     }
-    let refused = home.bench(&["report", "-o", "out"]);
-    assert_eq!(code(&refused), 1, "{}", text(&refused.stdout));
-    assert!(text(&refused.stderr).contains("the first is 2"), "{}", text(&refused.stderr));
+    let said = messages_of(&home.bench(&["report", "-o", "out"]), 1);
+    assert!(said.contains("the first is 2"), "{said}");
     let told = ok(home.bench(&arguments));
     assert!(told.contains("1 task run; 1 had results of an earlier run"), "{told}");
     assert!(files(&home.path("out"))["report.json"] == before["report.json"], "the report differs");
@@ -271,9 +273,8 @@ fn jobs_shards_and_single_tasks_give_the_same_bytes() {
 fn a_pipeline_that_panics_fails_alone() {
     let home = Home::new();
     home.config("panics", "config = { panic_after_frames = 4 }");
-    let output = home.bench(&["--logs-dir", "logs", "-o", "out"]);
-    assert_eq!(code(&output), 1);
-    assert!(text(&output.stderr).contains("2 of 6 tasks failed"), "{}", text(&output.stderr));
+    let said = messages_of(&home.bench(&["--logs-dir", "logs", "-o", "out"]), 1);
+    assert!(said.contains("2 of 6 tasks failed"), "{said}");
     let report = home.report("out");
     for task in report["tasks"].as_array().unwrap() {
         let ended = task["outcome"]["ended"].as_str().unwrap();
@@ -351,9 +352,7 @@ fn a_pipeline_that_can_detect_nothing_is_skipped_with_the_reason_that_run_gives(
         let config = format!("unable/{name}.toml");
         let mut run = own_plugin();
         run.args(["run", &config, "logs/short.mcap", "-o", name]).current_dir(home.folder.path());
-        let run = run.output().unwrap();
-        let told = text(&run.stderr);
-        assert_eq!(code(&run), 1, "{told}");
+        let told = messages_of(&run.output().unwrap(), 1);
         assert!(told.contains(reason), "{told}\nis not: {reason}");
     }
 }
@@ -401,9 +400,8 @@ fn doubled_ids_of_a_truth_are_dropped_if_asked_for() {
     let failed = home.report("out")["tasks"][0]["outcome"].clone();
     let why = failed["why"].as_str().unwrap_or_default();
     assert!(why.contains("occurs twice") && why.contains("`--drop-doubled-ids`"), "{failed}");
-    let output = home.bench(&[&only[..], &["-o", "dropped", "--drop-doubled-ids"]].concat());
-    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
-    let told = text(&output.stdout);
+    let told =
+        results_of(&home.bench(&[&only[..], &["-o", "dropped", "--drop-doubled-ids"]].concat()));
     assert!(told.contains("note: short.people.csv: 1 people are left out"), "{told}");
     let notes = home.report("dropped")["notes"].to_string();
     assert!(notes.contains("\"short.people.csv: 1 people are left out"), "{notes}");
@@ -416,12 +414,10 @@ fn what_changed_since_the_plan_is_not_run() {
     let home = Home::new();
     ok(home.bench(&["plan", "--logs", "logs/short.mcap", "-o", "out"]));
     fs::write(home.path("logs/short.people.csv"), crate::common::people(8)).unwrap();
-    let output = home.bench(&["run", "-o", "out"]);
-    assert_eq!(code(&output), 2);
-    assert!(text(&output.stderr).contains("plan again"), "{}", text(&output.stderr));
-    let early = home.bench(&["report", "-o", "out"]);
-    assert_eq!(code(&early), 1);
-    assert!(text(&early.stderr).contains("2 of 2 tasks have no result"), "{}", text(&early.stderr));
+    let said = messages_of(&home.bench(&["run", "-o", "out"]), 2);
+    assert!(said.contains("plan again"), "{said}");
+    let said = messages_of(&home.bench(&["report", "-o", "out"]), 1);
+    assert!(said.contains("2 of 2 tasks have no result"), "{said}");
     assert_eq!(code(&home.bench(&["run", "-o", "out", "--task", "99"])), 2);
     assert_eq!(code(&home.bench(&["run", "-o", "nowhere"])), 2);
 }
@@ -435,9 +431,7 @@ fn the_gate_closes_on_what_got_worse() {
     ok(home.bench(&[&logs[..], &["-o", "same"], &gate].concat()));
     // Nothing is nearer than this: no person is found.
     home.config("near", "config = { max_depth_m = 1.0 }");
-    let output = home.bench(&[&logs[..], &["-o", "new"], &gate].concat());
-    assert_eq!(code(&output), 1);
-    let told = text(&output.stderr);
+    let told = messages_of(&home.bench(&[&logs[..], &["-o", "new"], &gate].concat()), 1);
     assert!(told.contains("near  long  7  HOTA<-0.01") && told.contains("FN>0"), "{told}");
     assert_eq!(code(&home.bench(&["report", "-o", "same", "--baseline", "no.json"])), 1);
 }
@@ -508,9 +502,7 @@ fn copies_of_one_log_are_no_independent_logs() {
         command.current_dir(home.folder.path()).args(["alter", &log, "--mirror", "-o", &copy]);
         ok(command.output().unwrap());
     }
-    let done = home.bench(&["--logs-dir", "logs", "-o", "out"]);
-    assert_eq!(code(&done), 0, "{}", text(&done.stderr));
-    let told = text(&done.stdout);
+    let told = results_of(&home.bench(&["--logs-dir", "logs", "-o", "out"]));
     assert!(told.contains("note: mirrored and short and twice go back to one recording"), "{told}");
     let copies = serde_json::json!([["mirrored", "short", "twice"]]);
     assert_eq!(home.report("out")["copies"], copies);

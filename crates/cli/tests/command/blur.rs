@@ -9,7 +9,7 @@ use tagalong_log::msgs::{Header, Image, decode};
 use tagalong_log::write::MessageLog;
 use tagalong_log::{Limits, LogWalker};
 
-use crate::common::{Drawn, code, own_plugin, tagalong, text};
+use crate::common::{Drawn, code, messages_of, own_plugin, results_of, tagalong, text};
 
 const COLOUR: &str = "/camera/color/image_raw";
 
@@ -53,9 +53,7 @@ fn messages(path: &Path) -> BTreeMap<String, Vec<(u64, Vec<u8>)>> {
 #[test]
 fn heads_are_blurred_and_all_else_is_as_it_was() {
     let folder = home();
-    let done = blur(folder.path(), &["walk.mcap", "--run", "out"]);
-    assert_eq!(code(&done), 0, "{}", text(&done.stderr));
-    let said = text(&done.stdout);
+    let said = results_of(&blur(folder.path(), &["walk.mcap", "--run", "out"]));
     assert!(said.contains("left out: 1 message of /rear/image_raw"), "{said}");
     assert!(said.contains("look through the copy"), "{said}");
     let mut before = messages(&folder.path().join("walk.mcap"));
@@ -91,13 +89,12 @@ fn without_a_run_one_is_made_and_removed() {
 #[test]
 fn the_log_itself_a_copy_that_exists_and_the_run_of_another_log_are_refused() {
     let folder = home();
-    let itself = blur(folder.path(), &["walk.mcap", "-o", "walk.mcap", "--overwrite"]);
-    assert_eq!(code(&itself), 2);
-    assert!(text(&itself.stderr).contains("would replace the log"), "{}", text(&itself.stderr));
+    let said =
+        messages_of(&blur(folder.path(), &["walk.mcap", "-o", "walk.mcap", "--overwrite"]), 2);
+    assert!(said.contains("would replace the log"), "{said}");
     let exists = blur(folder.path(), &["walk.mcap", "-o", "drawn.mcap"]);
     assert_eq!(code(&exists), 2);
     assert!(text(&exists.stderr).contains("--overwrite"));
-    let other = blur(folder.path(), &["drawn.mcap", "--run", "out"]);
-    assert_eq!(code(&other), 2);
-    assert!(text(&other.stderr).contains("is a run over walk.mcap"), "{}", text(&other.stderr));
+    let said = messages_of(&blur(folder.path(), &["drawn.mcap", "--run", "out"]), 2);
+    assert!(said.contains("is a run over walk.mcap"), "{said}");
 }

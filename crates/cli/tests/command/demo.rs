@@ -3,16 +3,15 @@
 use std::collections::BTreeSet;
 use std::fs;
 
-use crate::common::{code, tagalong, text};
+use crate::common::{code, messages_of, tagalong, text};
 
 #[test]
 fn a_folder_with_other_files_is_left_alone() {
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(folder.path().join("tagalong-demo")).unwrap();
     fs::write(folder.path().join("tagalong-demo/mine.txt"), "mine").unwrap();
-    let output = tagalong().current_dir(folder.path()).arg("demo").output().unwrap();
-    assert_eq!(code(&output), 2);
-    assert!(text(&output.stderr).contains("--overwrite"), "{}", text(&output.stderr));
+    let said = messages_of(&tagalong().current_dir(folder.path()).arg("demo").output().unwrap(), 2);
+    assert!(said.contains("--overwrite"), "{said}");
     assert_eq!(fs::read_dir(folder.path().join("tagalong-demo")).unwrap().count(), 1);
 }
 

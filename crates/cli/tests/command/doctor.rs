@@ -54,12 +54,12 @@ fn complaints(said: &Value) -> Vec<&str> {
     worse.map(|f| f["id"].as_str().unwrap()).collect()
 }
 
-/// A log broken in one way, and the expected finding.
+/// A log broken in one way, and the expected finding with a part of its remedy.
 struct Case {
     name: &'static str,
     changes: Changes,
-    id: &'static str,
-    severity: &'static str,
+    /// Finding and severity: `depth: bad`.
+    finding: &'static str,
     remedy: &'static str,
 }
 
@@ -87,6 +87,26 @@ fn with_tf(tf: fn(&mut TFMessage)) -> Changes {
     Changes { tf: Some(tf), ..Changes::default() }
 }
 
+fn grey(level: u8) -> Changes {
+    Changes { grey_level: Some(level), ..Changes::default() }
+}
+
+fn with_stamp(stamp: fn(u64) -> u64) -> Changes {
+    Changes { stamp: Some(stamp), ..Changes::default() }
+}
+
+fn with_depth_stamp(depth_stamp: fn(u64, u64) -> u64) -> Changes {
+    Changes { depth_stamp: Some(depth_stamp), ..Changes::default() }
+}
+
+fn thinned(topic: &'static str, interval: u64) -> Changes {
+    Changes { thinned: Some((topic, interval)), ..Changes::default() }
+}
+
+fn without(topics: &'static [&'static str]) -> Changes {
+    Changes { without: topics, ..Changes::default() }
+}
+
 /// Turns every transform by an angle about an axis of the child.
 fn turned(tf: &mut TFMessage, axis: usize, degrees: f64) {
     for transform in &mut tf.transforms {
@@ -104,167 +124,97 @@ fn uncalibrated(info: &mut CameraInfo) {
     info.p = [0.0; 12];
 }
 
-fn case(
-    name: &'static str,
-    changes: Changes,
-    id: &'static str,
-    severity: &'static str,
-    remedy: &'static str,
-) -> Case {
-    Case { name, changes, id, severity, remedy }
+/// Moves the camera up by half a metre.
+fn raise(tf: &mut TFMessage) {
+    tf.transforms.iter_mut().for_each(|t| t.transform.translation.z += 0.5);
+}
+
+fn case(name: &'static str, changes: Changes, finding: &'static str, remedy: &'static str) -> Case {
+    Case { name, changes, finding, remedy }
 }
 
 fn cases() -> Vec<Case> {
     vec![
-        case("depth beside colour", shifted(-7, 2), "registration", "bad", "depth_offset_px = ["),
-        case("tenths of millimetres", scaled(10.0), "depth", "bad", "depth_unit_m = 0.0001"),
-        case("centimetres", scaled(0.1), "depth", "bad", "depth_unit_m = 0.01"),
-        case("half of the unit", scaled(0.5), "mount", "bad", "depth_unit_m"),
-        case("no readings", scaled(0.0), "depth", "bad", "depth_topic"),
+        case("depth beside colour", shifted(-7, 2), "registration: bad", "depth_offset_px = ["),
+        case("tenths of millimetres", scaled(10.0), "depth: bad", "depth_unit_m = 0.0001"),
+        case("centimetres", scaled(0.1), "depth: bad", "depth_unit_m = 0.01"),
+        case("half of the unit", scaled(0.5), "mount: bad", "depth_unit_m"),
+        case("no readings", scaled(0.0), "depth: bad", "depth_topic"),
         case(
             "the calibration of half the size",
-            with_info(|info| {
-                info.k[0] *= 0.5;
-                info.k[2] *= 0.5;
-                info.k[4] *= 0.5;
-                info.k[5] *= 0.5;
-            }),
-            "intrinsics",
-            "bad",
+            with_info(|info| [0, 2, 4, 5].iter().for_each(|at: &usize| info.k[*at] *= 0.5)),
+            "intrinsics: bad",
             "colour_info_topic",
         ),
         case(
             "the calibration of another size",
             with_info(|info| (info.width, info.height) = (640, 480)),
-            "intrinsics",
-            "bad",
+            "intrinsics: bad",
             "colour_info_topic",
         ),
-        case("uncalibrated", with_info(uncalibrated), "intrinsics", "bad", "REP 104"),
-        case("tilted", with_tf(|tf| turned(tf, 0, 8.0)), "mount", "bad", "pitch_down_deg"),
-        case("rolled", with_tf(|tf| turned(tf, 2, 5.0)), "mount", "warn", "roll_deg"),
-        case(
-            "too high",
-            with_tf(|tf| tf.transforms.iter_mut().for_each(|t| t.transform.translation.z += 0.5)),
-            "mount",
-            "bad",
-            "height_m",
-        ),
-        case("a body frame", with_tf(|tf| turned(tf, 0, 90.0)), "frames", "bad", "[input.camera]"),
+        case("uncalibrated", with_info(uncalibrated), "intrinsics: bad", "REP 104"),
+        case("tilted", with_tf(|tf| turned(tf, 0, 8.0)), "mount: bad", "pitch_down_deg"),
+        case("rolled", with_tf(|tf| turned(tf, 2, 5.0)), "mount: warn", "roll_deg"),
+        case("too high", with_tf(raise), "mount: bad", "height_m"),
+        case("a body frame", with_tf(|tf| turned(tf, 0, 90.0)), "frames: bad", "[input.camera]"),
         case(
             "another robot frame",
             with_tf(|tf| tf.transforms.iter_mut().for_each(|t| t.header.frame_id = "base".into())),
-            "frames",
-            "warn",
+            "frames: warn",
             "base_frame = \"base\"",
         ),
         case(
             "no transform to the camera",
             with_tf(|tf| tf.transforms.iter_mut().for_each(|t| t.child_frame_id = "laser".into())),
-            "frames",
-            "warn",
+            "frames: warn",
             "[input.camera]",
         ),
+        case("black", grey(3), "exposure: bad", "longer"),
+        case("white", grey(255), "exposure: bad", "shorter"),
+        case("late depth", with_depth_stamp(|_, at| at + 28_000_000), "skew: warn", "capture"),
+        case("two thirds of depth lost", thinned("aligned_depth", 3), "skew: ok", ""),
         case(
-            "black",
-            Changes { grey_level: Some(3), ..Changes::default() },
-            "exposure",
-            "bad",
-            "longer",
-        ),
-        case(
-            "white",
-            Changes { grey_level: Some(255), ..Changes::default() },
-            "exposure",
-            "bad",
-            "shorter",
-        ),
-        case(
-            "depth stamped late",
-            Changes { depth_stamp: Some(|_, at| at + 28_000_000), ..Changes::default() },
-            "skew",
-            "warn",
-            "capture",
-        ),
-        case(
-            "two thirds of depth lost",
-            Changes { thinned: Some(("aligned_depth", 3)), ..Changes::default() },
-            "skew",
-            "ok",
-            "",
-        ),
-        case(
-            "depth of another clock",
-            Changes { depth_stamp: Some(|_, at| at + 600_000_000_000), ..Changes::default() },
-            "skew",
-            "bad",
+            "another clock",
+            with_depth_stamp(|_, at| at + 600_000_000_000),
+            "skew: bad",
             "capture",
         ),
         case(
             "a clock that jumps back",
-            Changes {
-                stamp: Some(
-                    |at| if at > FIRST_NS + 1_200_000_000 { at - 5_000_000_000 } else { at },
-                ),
-                ..Changes::default()
-            },
-            "stamps",
-            "bad",
+            with_stamp(|at| if at > MIDDLE_NS { at - 5_000_000_000 } else { at }),
+            "stamps: bad",
             "use_sim_time",
         ),
-        case(
-            "stamps that were never set",
-            Changes { stamp: Some(|_| FIRST_NS), ..Changes::default() },
-            "stamps",
-            "warn",
-            "header.stamp",
-        ),
+        case("stamps never set", with_stamp(|_| FIRST_NS), "stamps: warn", "header.stamp"),
         case(
             "a pause",
-            Changes {
-                stamp: Some(
-                    |at| if at > FIRST_NS + 1_200_000_000 { at + 3_000_000_000 } else { at },
-                ),
-                ..Changes::default()
-            },
-            "stamps",
-            "warn",
+            with_stamp(|at| if at > MIDDLE_NS { at + 3_000_000_000 } else { at }),
+            "stamps: warn",
             "reset_gap_s",
         ),
-        case(
-            "one image a second",
-            Changes { thinned: Some(("/camera/", 10)), ..Changes::default() },
-            "rate",
-            "warn",
-            "record 5 a second",
-        ),
-        case(
-            "no depth",
-            Changes { without: &["depth"], ..Changes::default() },
-            "needs",
-            "bad",
-            "depth_topic",
-        ),
+        case("one image a second", thinned("/camera/", 10), "rate: warn", "record 5 a second"),
+        case("no depth", without(&["depth"]), "needs: bad", "depth_topic"),
         case(
             "no calibration",
-            Changes { without: &["camera_info"], ..Changes::default() },
-            "needs",
-            "bad",
+            without(&["camera_info"]),
+            "needs: bad",
             "record its topic with the images",
         ),
     ]
 }
 
 const FIRST_NS: u64 = crate::common::FIRST_NS;
+const MIDDLE_NS: u64 = FIRST_NS + 1_200_000_000;
 
 #[test]
 fn what_was_broken_is_found() {
     let home = tempfile::tempdir().unwrap();
     let log = home.path().join("broken.mcap");
     let mut missed = Vec::new();
-    for Case { name, changes, id, severity, remedy } in cases() {
+    for Case { name, changes, finding: expected, remedy } in cases() {
         broken::write(good(), &log, &changes);
         let (code, said) = doctor(&config(), &log, &["--frames", "24", "--settings", "never"]);
+        let (id, severity) = expected.split_once(": ").unwrap();
         let found = finding(&said, id);
         let told = found["remedy"].as_str().unwrap_or_default();
         if found["severity"] != severity || !told.contains(remedy) {

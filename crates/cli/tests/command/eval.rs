@@ -6,7 +6,9 @@ use std::process::Output;
 
 use serde_json::Value;
 
-use crate::common::{Drawn, code, json, own_plugin, tagalong, text, write};
+use crate::common::{
+    Drawn, code, json, messages_of, own_plugin, results_of, tagalong, text, write,
+};
 
 fn eval(arguments: &[&str]) -> Output {
     tagalong().arg("eval").args(arguments).output().unwrap()
@@ -138,9 +140,7 @@ fn truth_that_is_named_after_another_log_is_noted() {
         ("other.people.csv", "out/tracks.csv", true),
         ("truth.csv", "out", false),
     ] {
-        let output = in_home(folder.path(), &["--truth", truth, "--tracks", tracks]);
-        let said = text(&output.stdout);
-        assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+        let said = results_of(&in_home(folder.path(), &["--truth", truth, "--tracks", tracks]));
         assert_eq!(
             said.contains("named after other, and the run is of walk.mcap"),
             is_noted,
@@ -170,9 +170,8 @@ fn tracks_of_a_run_that_was_stopped_are_noted() {
     let stopped = whole.replace("\"ended\": \"complete\"", "\"ended\": \"stopped by signal 2\"");
     for (written, is_noted) in [(&whole, false), (&stopped, true)] {
         fs::write(&report, written).unwrap();
-        let output = in_home(folder.path(), &["--truth", "walk.people.csv", "--tracks", "out"]);
-        let said = text(&output.stdout);
-        assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+        let said =
+            results_of(&in_home(folder.path(), &["--truth", "walk.people.csv", "--tracks", "out"]));
         assert_eq!(said.contains("the run is not whole (stopped by signal 2)"), is_noted, "{said}");
     }
 }
@@ -189,9 +188,7 @@ fn people_annotated_in_laser_scans_are_truth_on_the_floor() {
     );
     fs::write(folder.path().join("walk.people-floor.csv"), rows).unwrap();
     let files = ["--truth", "walk.people-floor.csv", "--tracks", "out", "--format", "json"];
-    let image = in_home(folder.path(), &files);
-    assert_eq!(code(&image), 2);
-    let said = text(&image.stderr);
+    let said = messages_of(&in_home(folder.path(), &files), 2);
     assert!(said.contains("--similarity metres"), "{said}");
     let floor = json(&in_home(folder.path(), &[&files[..], &["--similarity", "metres"]].concat()));
     assert_eq!((floor["truths"].as_u64(), floor["FN"].as_u64()), (Some(2), Some(0)), "{floor}");
@@ -203,31 +200,31 @@ fn a_log_that_is_not_beside_the_truth_can_be_named() {
     fs::create_dir(folder.path().join("elsewhere")).unwrap();
     fs::rename(folder.path().join("walk.mcap"), folder.path().join("elsewhere/w.mcap")).unwrap();
     let files = ["--truth", "walk.people.csv", "--tracks", "out", "--similarity", "metres"];
-    let lost = in_home(folder.path(), &files);
-    assert_eq!(code(&lost), 2);
-    assert!(text(&lost.stderr).contains("--log"), "{}", text(&lost.stderr));
-    let found = in_home(folder.path(), &[&files[..], &["--log", "elsewhere/w.mcap"]].concat());
-    assert_eq!(code(&found), 0, "{}", text(&found.stderr));
-    assert!(text(&found.stdout).contains("HOTA"), "{}", text(&found.stdout));
+    let said = messages_of(&in_home(folder.path(), &files), 2);
+    assert!(said.contains("--log"), "{said}");
+    let said =
+        results_of(&in_home(folder.path(), &[&files[..], &["--log", "elsewhere/w.mcap"]].concat()));
+    assert!(said.contains("HOTA"), "{said}");
 }
 
 #[test]
 fn mistakes_are_named_by_file_and_line() {
     let folder = home();
     fs::write(folder.path().join("bad.txt"), "1,1,0,0,5,5,1\n2,1,0,zero,5,5,1\n").unwrap();
-    let bad = in_home(folder.path(), &["--truth", "walk.people.csv", "--tracks", "bad.txt"]);
-    assert_eq!(code(&bad), 1);
-    assert!(text(&bad.stderr).contains("bad.txt, line 2"), "{}", text(&bad.stderr));
-    let none = in_home(folder.path(), &["--truth", "none.csv", "--tracks", "out"]);
-    assert_eq!(code(&none), 1);
-    assert!(text(&none.stderr).contains("none.csv"), "{}", text(&none.stderr));
-    let log = in_home(folder.path(), &["--truth", "walk.mcap", "--tracks", "out"]);
-    assert_eq!(code(&log), 2);
-    assert!(text(&log.stderr).contains("`--truth walk.people.csv`"), "{}", text(&log.stderr));
+    let said = messages_of(
+        &in_home(folder.path(), &["--truth", "walk.people.csv", "--tracks", "bad.txt"]),
+        1,
+    );
+    assert!(said.contains("bad.txt, line 2"), "{said}");
+    let said = messages_of(&in_home(folder.path(), &["--truth", "none.csv", "--tracks", "out"]), 1);
+    assert!(said.contains("none.csv"), "{said}");
+    let said =
+        messages_of(&in_home(folder.path(), &["--truth", "walk.mcap", "--tracks", "out"]), 2);
+    assert!(said.contains("`--truth walk.people.csv`"), "{said}");
     fs::copy(folder.path().join("walk.mcap"), folder.path().join("alone.mcap")).unwrap();
-    let alone = in_home(folder.path(), &["--truth", "alone.mcap", "--tracks", "out"]);
-    assert_eq!(code(&alone), 1);
-    assert!(text(&alone.stderr).contains("/truth/people"), "{}", text(&alone.stderr));
+    let said =
+        messages_of(&in_home(folder.path(), &["--truth", "alone.mcap", "--tracks", "out"]), 1);
+    assert!(said.contains("/truth/people"), "{said}");
     assert_eq!(code(&eval(&["--truth", "a", "--tracks", "b", "--similarity", "feet"])), 2);
 }
 
@@ -435,9 +432,7 @@ fn truth_that_ends_far_before_the_sequence_is_noted() {
         let truth: String = (1..=last).map(row).collect();
         write(folder.path(), "gt.txt", &truth);
         let files = ["--truth", "gt.txt", "--tracks", "tracks.txt"];
-        let output = in_home(folder.path(), &files);
-        assert_eq!(code(&output), 0, "{}", text(&output.stderr));
-        let said = text(&output.stdout);
+        let said = results_of(&in_home(folder.path(), &files));
         let note = "its last frame with people is 20, and seqLength is 600";
         assert_eq!(said.contains(note), is_noted, "{said}");
     }
@@ -447,17 +442,13 @@ fn truth_that_ends_far_before_the_sequence_is_noted() {
 fn doubled_ids_of_the_truth_are_dropped_if_asked_for() {
     let truth = "1,1,0,0,40,90,1,-1,-1,-1\n1,1,200,0,40,90,1,-1,-1,-1\n";
     let track = "1,1,0,0,40,90,1,-1,-1,-1\n";
-    let refused = scored(truth, track, &[]);
-    assert_eq!(code(&refused), 1);
-    let said = text(&refused.stderr);
+    let said = messages_of(&scored(truth, track, &[]), 1);
     assert!(said.contains("gt.txt: ") && said.contains("truth id 1 occurs twice"), "{said}");
     assert!(said.contains("`--drop-doubled-ids` keeps the first"), "{said}");
     let said = json(&scored(truth, track, &["--drop-doubled-ids", "--format", "json"]));
     assert_eq!((said["truths"].as_u64(), said["TP"].as_u64()), (Some(1), Some(1)), "{said}");
     assert!(said["notes"].to_string().contains("1 people are left out"), "{said}");
     // Of tracks nothing is dropped: a tracker that reports an ID twice is wrong.
-    let doubled = scored(track, truth, &["--drop-doubled-ids"]);
-    assert_eq!(code(&doubled), 1);
-    let said = text(&doubled.stderr);
+    let said = messages_of(&scored(track, truth, &["--drop-doubled-ids"]), 1);
     assert!(said.contains("tracks.txt: ") && !said.contains("`--drop"), "{said}");
 }

@@ -6,7 +6,7 @@ use std::process::Output;
 
 use serde_json::Value;
 
-use crate::common::{code, json, tagalong, text};
+use crate::common::{code, json, messages_of, tagalong, text};
 
 const SCENE: &str = "duration_s = 5.0\n[camera]\nwidth = 120\nheight = 90\ncolour = false\n\
     [robot]\nstart = [1.0, 3.0]\n[[people]]\npath = [[3.2, 3.0], [8.0, 3.0]]\nspeed_mps = 0.6\n";
@@ -116,9 +116,8 @@ fn the_log_of_a_ride_has_commands_and_their_reasons() {
 #[test]
 fn a_pipeline_that_steers_nothing_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let output = follow(folder.path(), "depth-ekf.toml", &[]);
-    assert_eq!(code(&output), 2);
-    assert!(text(&output.stderr).contains("has no [controller]"), "{}", text(&output.stderr));
+    let said = messages_of(&follow(folder.path(), "depth-ekf.toml", &[]), 2);
+    assert!(said.contains("has no [controller]"), "{said}");
     let output = follow(folder.path(), "follow-depth.toml", &["--drop", "1.5"]);
     assert_eq!(code(&output), 2);
 }
@@ -138,9 +137,8 @@ fn the_pictures_of_a_ride_are_those_of_its_frames() {
     names.sort();
     assert_eq!(names[0], "000001.png");
     assert_eq!(*names.last().unwrap(), format!("{:06}.png", names.len()), "{names:?}");
-    let output = follow(folder.path(), "follow-depth.toml", &["--overlay"]);
-    assert_eq!(code(&output), 2);
-    assert!(text(&output.stderr).contains("--output"), "{}", text(&output.stderr));
+    let said = messages_of(&follow(folder.path(), "follow-depth.toml", &["--overlay"]), 2);
+    assert!(said.contains("--output"), "{said}");
 }
 
 fn view(folder: &Path, arguments: &[&str]) -> Output {
@@ -191,9 +189,9 @@ fn the_results_of_earlier_rides_are_replaced_on_request_alone() {
     let before = fs::read(&results).unwrap();
     // Its log has another name, and its tables would take the place of those of the first.
     let other = ["--first-seed", "1"];
-    let refused = follow(folder.path(), "follow-depth.toml", &[&rides[..], &other].concat());
-    assert_eq!(code(&refused), 2);
-    assert!(text(&refused.stderr).contains("follow.json exists"), "{}", text(&refused.stderr));
+    let said =
+        messages_of(&follow(folder.path(), "follow-depth.toml", &[&rides[..], &other].concat()), 2);
+    assert!(said.contains("follow.json exists"), "{said}");
     assert_eq!(fs::read(&results).unwrap(), before);
     let again = [&rides[..], &other, &["--overwrite"]].concat();
     json(&follow(folder.path(), "follow-depth.toml", &again));
@@ -206,9 +204,8 @@ fn a_ride_of_a_robot_with_topics_of_its_own_has_images() {
     let folder = tempfile::tempdir().unwrap();
     let bumper = ["--set", "bumpers=[{name=\"hazards\"}]"];
     let rides = ["-o", "rides", "--format", "json"];
-    let bare = follow(folder.path(), "robots/turtlebot4.toml", &rides);
-    assert_eq!(code(&bare), 2, "{}", text(&bare.stdout));
-    assert!(text(&bare.stderr).contains("lacks the source `hazards`"), "{}", text(&bare.stderr));
+    let said = messages_of(&follow(folder.path(), "robots/turtlebot4.toml", &rides), 2);
+    assert!(said.contains("lacks the source `hazards`"), "{said}");
     assert!(!folder.path().join("rides").exists(), "nothing is written before the refusal");
     json(&follow(folder.path(), "robots/turtlebot4.toml", &[&rides[..], &bumper].concat()));
     let name = "rides/walk-turtlebot4-2000000000";

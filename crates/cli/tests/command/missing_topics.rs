@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use crate::common::{Drawn, code, config, own_plugin, tagalong, text};
+use crate::common::{Drawn, code, config, messages_of, own_plugin, tagalong, text};
 
 /// Runs with these settings; returns the exit code and the message.
 fn run(home: &Path, log: &str, input: &str) -> (i32, String) {
@@ -72,9 +72,7 @@ fn a_log_of_which_no_frame_can_be_made_is_no_success() {
     Drawn::of(3).write(&home.path().join("good.mcap"));
     config(home.path(), "[limits]\nimage_side_px = 8");
     let args = ["run", "nearest.toml", "good.mcap"];
-    let output = own_plugin().args(args).current_dir(home.path()).output().unwrap();
-    let told = text(&output.stderr);
-    assert_eq!(code(&output), 1, "{told}");
+    let told = messages_of(&own_plugin().args(args).current_dir(home.path()).output().unwrap(), 1);
     assert!(told.contains("not one frame could be made of good.mcap: "), "{told}");
     assert!(told.contains("images too large 3"), "{told}");
     let doctor = "`tagalong doctor nearest.toml good.mcap` tells more";
@@ -88,9 +86,8 @@ fn a_config_for_a_pair_on_another_log_leads_to_the_configs_that_fit() {
     let home = tempfile::tempdir().unwrap();
     Drawn::of(3).write(&home.path().join("rgbd.mcap"));
     let arguments = ["run", "stereo-verified", "rgbd.mcap"];
-    let output = tagalong().args(arguments).current_dir(home.path()).output().unwrap();
-    let told = text(&output.stderr);
-    assert_eq!(code(&output), 1, "{told}");
+    let told =
+        messages_of(&tagalong().args(arguments).current_dir(home.path()).output().unwrap(), 1);
     assert!(told.contains("no log of a stereo pair") && told.contains("tagalong doctor"), "{told}");
     assert!(!told.contains("as `right_topic`"), "{told}");
 }

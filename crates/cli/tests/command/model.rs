@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-use crate::common::{code, tagalong, text};
+use crate::common::{code, messages_of, results_of, tagalong, text};
 
 fn network(name: &str) -> PathBuf {
     [env!("CARGO_MANIFEST_DIR"), "..", "network", "tests", "models", name].iter().collect()
@@ -28,9 +28,9 @@ fn printed_at(home: &Path, arguments: &[&str]) -> String {
 fn a_network_is_described_by_the_config_that_runs_it() {
     let home = tempfile::tempdir().unwrap();
     fs::copy(network("nanodet.onnx"), home.path().join("net.onnx")).unwrap();
-    let told = tagalong().args(["model", "net.onnx"]).current_dir(home.path()).output().unwrap();
-    assert_eq!(code(&told), 0, "{}", text(&told.stderr));
-    let config = text(&told.stdout);
+    let config = results_of(
+        &tagalong().args(["model", "net.onnx"]).current_dir(home.path()).output().unwrap(),
+    );
     for part in [
         "# inputs   `images` [1, 3, 64, 64]\n",
         "# outputs  `output` [1, 85, 34]\n",
@@ -150,9 +150,8 @@ fn installed_networks_are_listed_and_removed_by_their_names() {
         list.contains("second (taken for") && list.contains("faces (re-identification"),
         "{list}"
     );
-    let typo = run_at(home, &["model", "--remove", "secnd"]);
-    assert_eq!(code(&typo), 2);
-    assert!(text(&typo.stderr).contains("did you mean `second`?"), "{}", text(&typo.stderr));
+    let said = messages_of(&run_at(home, &["model", "--remove", "secnd"]), 2);
+    assert!(said.contains("did you mean `second`?"), "{said}");
     let told = printed_at(home, &["model", "--remove", "second"]);
     assert!(told.contains("`first` is now taken for a log with colour alone"), "{told}");
     for name in ["faces", "first"] {
@@ -169,14 +168,12 @@ fn files_that_exist_are_replaced_on_request_alone() {
     fs::copy(network("nanodet.onnx"), home.join("net.onnx")).unwrap();
     let writing = ["model", "net.onnx", "-o", "people.toml"];
     fs::write(home.join("people.toml"), "mine").unwrap();
-    let refused = run_at(home, &writing);
-    assert_eq!(code(&refused), 2);
-    assert!(text(&refused.stderr).contains("people.toml exists"), "{}", text(&refused.stderr));
+    let said = messages_of(&run_at(home, &writing), 2);
+    assert!(said.contains("people.toml exists"), "{said}");
     assert_eq!(fs::read_to_string(home.join("people.toml")).unwrap(), "mine");
     printed_at(home, &[&writing[..], &["--overwrite"]].concat());
-    let export = run_at(home, &["model", "--export", "depth-net", "net.onnx"]);
-    assert_eq!(code(&export), 2);
-    assert!(text(&export.stderr).contains("net.onnx exists"), "{}", text(&export.stderr));
+    let said = messages_of(&run_at(home, &["model", "--export", "depth-net", "net.onnx"]), 2);
+    assert!(said.contains("net.onnx exists"), "{said}");
 }
 
 /// A published network on a street: once installed, it is taken without a config or a threshold.
@@ -191,9 +188,8 @@ fn an_installed_network_tracks_a_recorded_log() {
     let home = tempfile::tempdir().unwrap();
     let told = printed_at(home.path(), &["model", "--install", file.to_str().unwrap()]);
     assert!(told.contains("licence Apache-2.0"), "{told}");
-    let ran = run_at(home.path(), &["run", log.to_str().unwrap(), "-o", "out"]);
-    assert_eq!(code(&ran), 0, "{}", text(&ran.stderr));
-    assert!(text(&ran.stderr).contains("taking yolox-nano"), "{}", text(&ran.stderr));
+    let said = messages_of(&run_at(home.path(), &["run", log.to_str().unwrap(), "-o", "out"]), 0);
+    assert!(said.contains("taking yolox-nano"), "{said}");
     let report = fs::read_to_string(home.path().join("out/report.json")).unwrap();
     let report: serde_json::Value = serde_json::from_str(&report).unwrap();
     let with_person = report["frames"]["with_person"].as_u64().unwrap();
@@ -227,9 +223,9 @@ fn a_network_joined_with_depth_finds_people_close_by() {
 fn a_network_for_reidentification_is_described_by_its_section() {
     let home = tempfile::tempdir().unwrap();
     fs::copy(network("omz.onnx"), home.path().join("reid.onnx")).unwrap();
-    let told = tagalong().args(["model", "reid.onnx"]).current_dir(home.path()).output().unwrap();
-    assert_eq!(code(&told), 0, "{}", text(&told.stderr));
-    let section = text(&told.stdout);
+    let section = results_of(
+        &tagalong().args(["model", "reid.onnx"]).current_dir(home.path()).output().unwrap(),
+    );
     for part in [
         "re-identification: a person is 256 numbers",
         "128 x 256 pixels, stretched",
@@ -276,9 +272,7 @@ fn a_file_without_a_family_is_described_and_fails_with_the_reason() {
 #[test]
 fn files_that_are_no_networks_are_refused_by_name() {
     for (name, part) in [("none.onnx", "cannot be read"), ("yolox.json", "no ONNX file")] {
-        let told = tagalong().arg("model").arg(network(name)).output().unwrap();
-        assert_eq!(code(&told), 1);
-        let why = text(&told.stderr);
+        let why = messages_of(&tagalong().arg("model").arg(network(name)).output().unwrap(), 1);
         assert!(why.contains(name) && why.contains(part), "{why}");
     }
 }
@@ -331,8 +325,9 @@ fn an_export_takes_the_weights_of_a_model_file() {
 
 #[test]
 fn plugins_without_a_network_export_none() {
-    let told = tagalong().args(["model", "--export", "ekf", "net.onnx"]).output().unwrap();
-    assert_eq!(code(&told), 2);
-    let why = text(&told.stderr);
+    let why = messages_of(
+        &tagalong().args(["model", "--export", "ekf", "net.onnx"]).output().unwrap(),
+        2,
+    );
     assert!(why.contains("`ekf` has no network to export; available: depth-net"), "{why}");
 }

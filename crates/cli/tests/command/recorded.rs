@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::common::{Drawn, code, tagalong, text};
+use crate::common::{Drawn, code, messages_of, tagalong, text};
 
 fn shipped() -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/recorded.toml")
@@ -57,8 +57,6 @@ fn a_log_without_boxes_is_refused_with_the_name_of_the_topic() {
     Drawn::of(3).write(&folder.path().join("walk.mcap"));
     let mut run = tagalong();
     let output = run.current_dir(folder.path()).arg("run").arg(shipped()).arg("walk.mcap");
-    let output = output.output().unwrap();
-    assert_eq!(code(&output), 2);
-    let told = text(&output.stderr);
+    let told = messages_of(&output.output().unwrap(), 2);
     assert!(told.contains("/detections") && told.contains("detections_topic"), "{told}");
 }

@@ -8,7 +8,7 @@ use std::process::Output;
 
 use serde_json::Value;
 
-use crate::common::{Drawn, assert_same, code, own_plugin, people, text};
+use crate::common::{Drawn, assert_same, code, messages_of, own_plugin, people, text};
 
 /// The detector of the config misses the walker; one value of two lets it detect them.
 const TUNE: &str = "config = { max_depth_m = 2.0 }";
@@ -65,9 +65,7 @@ impl Home {
 
     /// The comparison is refused as a wrong use, with these words.
     fn refuses_with(&self, words: &[&str]) {
-        let output = self.rooms(&[]);
-        let told = text(&output.stderr);
-        assert_eq!(code(&output), 2, "{told}");
+        let told = messages_of(&self.rooms(&[]), 2);
         words.iter().for_each(|word| assert!(told.contains(word), "{word} in {told}"));
     }
 
@@ -201,9 +199,7 @@ fn a_setting_that_fails_is_named() {
     let home = Home::new();
     let tune = "\"detectors.0.config.panic_after_frames\" = [0, 4]";
     home.config("near", "", tune);
-    let output = home.rooms(&[]);
-    let told = text(&output.stderr);
-    assert_eq!(code(&output), 1, "{told}");
+    let told = messages_of(&home.rooms(&[]), 1);
     for words in ["2 runs failed", "near on a", "panic_after_frames = 4", "frame 5"] {
         assert!(told.contains(words), "{words} in {told}");
     }

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use crate::common::{Drawn, assert_same, code, config, own_plugin, text};
+use crate::common::{Drawn, assert_same, code, config, messages_of, own_plugin, results_of, text};
 
 const FILES: [&str; 4] = ["tracks.mcap", "tracks.csv", "tracks-metres.csv", "report.json"];
 
@@ -51,9 +51,7 @@ fn a_run_that_found_no_person_says_which_command_looks_for_the_cause() {
     let log = Drawn::of(1);
     // Nothing is nearer than this.
     let home = Home::new(&log, "config = { max_depth_m = 1.0 }");
-    let output = home.run("out", &[]);
-    let said = text(&output.stdout);
-    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    let said = results_of(&home.run("out", &[]));
     assert!(said.contains("walk.mcap: 1 frame, people in 0 of them"), "{said}");
     assert!(said.contains("`tagalong doctor nearest.toml walk.mcap` looks for"), "{said}");
 }
@@ -61,9 +59,8 @@ fn a_run_that_found_no_person_says_which_command_looks_for_the_cause() {
 #[test]
 fn a_run_writes_whole_files_and_says_what_it_found() {
     let home = Home::new(&Drawn::of(20), "");
-    let output = home.run("out", &[]);
-    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
-    assert!(text(&output.stdout).contains("\n1 ID:\n"), "{}", text(&output.stdout));
+    let said = results_of(&home.run("out", &[]));
+    assert!(said.contains("\n1 ID:\n"), "{said}");
     let mut names: Vec<_> = fs::read_dir(home.path("out"))
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
@@ -282,9 +279,7 @@ fn a_damaged_log_is_used_as_far_as_it_goes() {
 fn a_plugin_that_panics_ends_the_run_with_valid_files() {
     let home = Home::new(&Drawn::of(20), "config = { panic_after_frames = 9 }");
     let mut command = home.command("out", &[]);
-    let output = command.env_remove("RUST_BACKTRACE").output().unwrap();
-    let told = text(&output.stderr);
-    assert_eq!(code(&output), 3, "{told}");
+    let told = messages_of(&command.env_remove("RUST_BACKTRACE").output().unwrap(), 3);
     assert!(told.contains("nearest-thing") && told.contains("frame 10"), "{told}");
     assert!(!told.contains("backtrace") && told.lines().count() < 8, "{told}");
     let report = json(&home.path("out/report.json"));

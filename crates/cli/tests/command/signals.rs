@@ -7,7 +7,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crate::common::{Drawn, code, config, own_plugin, tagalong, text};
+use crate::common::{Drawn, code, config, messages_of, own_plugin, tagalong, text};
 
 /// A run that takes much longer than the test.
 fn slow_run(home: &Path) -> Child {
@@ -123,14 +123,15 @@ fn a_full_disk_is_told_with_the_name_of_the_file() {
     Drawn::of(200).write(&home.path().join("walk.mcap"));
     config(home.path(), "");
     let limited = "trap '' XFSZ; ulimit -f 8; exec \"$0\" run nearest.toml walk.mcap -o out";
-    let output = Command::new("sh")
-        .args(["-c", limited])
-        .arg(own_plugin().get_program())
-        .current_dir(home.path())
-        .output()
-        .unwrap();
-    let told = text(&output.stderr);
-    assert_eq!(code(&output), 1, "{told}");
+    let told = messages_of(
+        &Command::new("sh")
+            .args(["-c", limited])
+            .arg(own_plugin().get_program())
+            .current_dir(home.path())
+            .output()
+            .unwrap(),
+        1,
+    );
     assert!(told.contains("cannot write") && told.contains("out/tracks"), "{told}");
     assert!(!home.path().join("out/tracks.mcap").exists(), "half a file has no final name");
 }

@@ -9,7 +9,7 @@ use tagalong_log::msgs::{CameraInfo, PoseStamped, TFMessage, decode};
 use tagalong_log::{Limits, read_truth};
 use tagalong_sim::Scene;
 
-use crate::common::{code, tagalong, text};
+use crate::common::{code, messages_of, tagalong, text};
 
 const SMALL: &str = "duration_s = 0.6\n[camera]\nwidth = 64\nheight = 48\n[faults]\ndropped = 0.0\n\
     [[people]]\npath = [[4.0, 3.0], [4.0, 5.0]]\n";
@@ -63,9 +63,7 @@ fn pictures_show_the_truth() {
 fn a_wrong_scene_is_told_with_its_line() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("s.toml"), "seed = 1\n[room]\nheigth_m = 3.0\n").unwrap();
-    let output = simulate(folder.path(), &["s.toml"]);
-    assert_eq!(code(&output), 2);
-    let told = text(&output.stderr);
+    let told = messages_of(&simulate(folder.path(), &["s.toml"]), 2);
     assert!(told.contains("s.toml:3:1") && told.contains("did you mean `height_m`?"), "{told}");
     assert_eq!(code(&simulate(folder.path(), &["absent.toml"])), 2);
 }
@@ -90,9 +88,8 @@ fn a_split_and_settings_choose_the_scene() {
         (["--set", "crowd"], "write KEY=VALUE"),
         (["--split", "tests"], "did you mean `test`?"),
     ] {
-        let output = simulate(folder.path(), &[&["s.toml"][..], &wrong].concat());
-        assert_eq!(code(&output), 2);
-        assert!(text(&output.stderr).contains(told), "{}", text(&output.stderr));
+        let said = messages_of(&simulate(folder.path(), &[&["s.toml"][..], &wrong].concat()), 2);
+        assert!(said.contains(told), "{said}");
     }
 }
 

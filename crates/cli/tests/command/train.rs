@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::common::{assert_same, code, tagalong, text};
+use crate::common::{assert_same, code, messages_of, tagalong, text};
 
 fn train(folder: &Path, arguments: &[&str]) -> std::process::Output {
     tagalong().current_dir(folder).arg("train").args(arguments).output().unwrap()
@@ -38,9 +38,7 @@ fn the_same_seed_makes_the_same_model_and_card_and_the_model_works() {
 #[cfg(not(feature = "train"))]
 fn a_program_without_trainers_says_which_command_builds_them() {
     let folder = tempfile::tempdir().unwrap();
-    let output = train(folder.path(), &["svm-patch", "--quick"]);
-    assert_eq!(code(&output), 2);
-    let message = text(&output.stderr);
+    let message = messages_of(&train(folder.path(), &["svm-patch", "--quick"]), 2);
     assert!(
         message.contains("cargo run --release --features train -- train svm-patch"),
         "{message}"
@@ -51,9 +49,8 @@ fn a_program_without_trainers_says_which_command_builds_them() {
 #[cfg(feature = "train")]
 fn who_cannot_be_trained_is_told() {
     let folder = tempfile::tempdir().unwrap();
-    let output = train(folder.path(), &["ekf", "--quick"]);
-    assert_eq!(code(&output), 2);
-    assert!(text(&output.stderr).contains("`ekf` cannot be trained"), "{}", text(&output.stderr));
+    let said = messages_of(&train(folder.path(), &["ekf", "--quick"]), 2);
+    assert!(said.contains("`ekf` cannot be trained"), "{said}");
 }
 
 #[test]
@@ -61,9 +58,9 @@ fn who_cannot_be_trained_is_told() {
 fn wrong_settings_are_named() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("s.toml"), "[training]\nfold = 3\n").unwrap();
-    let output = train(folder.path(), &["svm-patch", "--quick", "--settings", "s.toml"]);
-    assert_eq!(code(&output), 2);
-    assert!(text(&output.stderr).contains("did you mean `folds`?"), "{}", text(&output.stderr));
+    let said =
+        messages_of(&train(folder.path(), &["svm-patch", "--quick", "--settings", "s.toml"]), 2);
+    assert!(said.contains("did you mean `folds`?"), "{said}");
 }
 
 /// Scenes of a file take the place of random rooms, as other draws.
@@ -90,7 +87,6 @@ fn a_verifier_is_trained_in_the_given_world() {
     let card: toml::Table = card.parse().unwrap();
     assert_eq!(card["trained_on"].as_array().unwrap()[0].as_str(), Some("simulated hall"));
     let missing = ["svm-patch", "-o", "b.toml", "--world", "none.toml", "--proposes", "low.toml"];
-    let output = train(folder.path(), &missing);
-    assert_eq!(code(&output), 2);
-    assert!(text(&output.stderr).contains("none.toml"), "{}", text(&output.stderr));
+    let said = messages_of(&train(folder.path(), &missing), 2);
+    assert!(said.contains("none.toml"), "{said}");
 }

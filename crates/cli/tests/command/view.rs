@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Output;
 
-use crate::common::{Drawn, code, config, own_plugin, text};
+use crate::common::{Drawn, code, config, messages_of, own_plugin, results_of, text};
 
 fn run(home: &Path, log: &str, out: &str) {
     let mut command = own_plugin();
@@ -34,9 +34,8 @@ fn data(page: &str) -> serde_json::Value {
 #[test]
 fn a_page_has_the_frames_the_images_and_the_candidates() {
     let home = home();
-    let output = view(home.path(), &["one"]);
-    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
-    assert!(text(&output.stdout).contains("one/view.html: 20 frames"), "{}", text(&output.stdout));
+    let said = results_of(&view(home.path(), &["one"]));
+    assert!(said.contains("one/view.html: 20 frames"), "{said}");
     let page = data(&fs::read_to_string(home.path().join("one/view.html")).unwrap());
     let frames = page["runs"][0]["frames"].as_array().unwrap();
     assert_eq!((frames.len(), page["t"].as_array().unwrap().len()), (20, 20));
@@ -57,13 +56,11 @@ fn a_page_has_the_frames_the_images_and_the_candidates() {
 fn a_log_that_is_gone_or_another_one_is_said() {
     let home = home();
     Drawn::of(12).write(&home.path().join("other.mcap"));
-    let wrong = view(home.path(), &["one", "--log", "other.mcap"]);
-    assert_eq!(code(&wrong), 2, "{}", text(&wrong.stderr));
-    assert!(text(&wrong.stderr).contains("is not the log of one"), "{}", text(&wrong.stderr));
+    let said = messages_of(&view(home.path(), &["one", "--log", "other.mcap"]), 2);
+    assert!(said.contains("is not the log of one"), "{said}");
     fs::rename(home.path().join("walk.mcap"), home.path().join("moved.mcap")).unwrap();
-    let gone = view(home.path(), &["one"]);
-    assert_eq!(code(&gone), 0, "{}", text(&gone.stderr));
-    assert!(text(&gone.stdout).contains("name it with --log"), "{}", text(&gone.stdout));
+    let said = results_of(&view(home.path(), &["one"]));
+    assert!(said.contains("name it with --log"), "{said}");
     let named = view(home.path(), &["one", "--overwrite", "--log", "moved.mcap"]);
     assert!(text(&named.stdout).contains("20 images"), "{}", text(&named.stdout));
 }
@@ -74,9 +71,8 @@ fn only_runs_of_one_log_are_compared() {
     Drawn::of(12).write(&home.path().join("other.mcap"));
     run(home.path(), "other.mcap", "two");
     run(home.path(), "walk.mcap", "three");
-    let refused = view(home.path(), &["one", "two"]);
-    assert_eq!(code(&refused), 2);
-    assert!(text(&refused.stderr).contains("different logs"), "{}", text(&refused.stderr));
+    let said = messages_of(&view(home.path(), &["one", "two"]), 2);
+    assert!(said.contains("different logs"), "{said}");
     let both = view(home.path(), &["one", "three", "-o", "both.html"]);
     assert_eq!(code(&both), 0, "{}", text(&both.stderr));
     let page = data(&fs::read_to_string(home.path().join("both.html")).unwrap());
@@ -123,9 +119,7 @@ fn the_truth_of_another_log_is_told() {
         ("truth.csv", 40, "has people up to frame 40, and the last of the log is 20"),
     ] {
         fs::write(home.path().join(name), crate::common::people(frames)).unwrap();
-        let output = view(home.path(), &["one", "--overwrite", "--truth", name]);
-        let said = text(&output.stdout);
-        assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+        let said = results_of(&view(home.path(), &["one", "--overwrite", "--truth", name]));
         let is_told = said.contains("if the truth is that of another log");
         assert_eq!((is_told, said.contains(sign)), (!sign.is_empty(), true), "{name}: {said}");
     }

@@ -5,7 +5,12 @@ use serde::{Deserialize, Serialize};
 
 use super::*;
 use crate::{Example, Fitted};
-use tagalong_core::{Detection, Frame, Inputs};
+use tagalong_core::{
+    Associations, Capabilities, Detection, EgoMotion, Estimate, Evidence, Frame, Funnel, Gate,
+    Initiation, Inputs, ObservedTrack, Query, Scene, Track, TrackChanges, TrackId, Twist,
+    Unassociated, Update,
+};
+use tagalong_geometry::Camera;
 
 #[derive(Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -119,74 +124,54 @@ fn context() -> Context {
 struct Idle;
 
 impl Detector for Idle {
-    fn capabilities(&self) -> tagalong_core::Capabilities {
-        tagalong_core::Capabilities::default()
+    fn capabilities(&self) -> Capabilities {
+        Capabilities::default()
     }
 
-    fn detect(
-        &mut self,
-        _: &Frame,
-        _: &tagalong_core::Query<'_>,
-        _: &mut tagalong_core::Funnel,
-    ) -> Result<Vec<Detection>> {
+    fn detect(&mut self, _: &Frame, _: &Query<'_>, _: &mut Funnel) -> Result<Vec<Detection>> {
         Ok(Vec::new())
     }
 }
 
 impl Filter for Idle {
-    fn start(&mut self, _: tagalong_core::TrackId, _: &Detection, _: &tagalong_geometry::Camera) {}
+    fn start(&mut self, _: TrackId, _: &Detection, _: &Camera) {}
 
-    fn predict(&mut self, _: &tagalong_core::EgoMotion, _: &tagalong_geometry::Camera) {}
+    fn predict(&mut self, _: &EgoMotion, _: &Camera) {}
 
-    fn update(
-        &mut self,
-        _: &tagalong_core::Evidence<'_>,
-    ) -> Result<BTreeMap<tagalong_core::TrackId, tagalong_core::Update>> {
+    fn update(&mut self, _: &Evidence<'_>) -> Result<BTreeMap<TrackId, Update>> {
         Ok(BTreeMap::new())
     }
 
-    fn estimates(
-        &self,
-        _: &tagalong_geometry::Camera,
-    ) -> BTreeMap<tagalong_core::TrackId, tagalong_core::Estimate> {
+    fn estimates(&self, _: &Camera) -> BTreeMap<TrackId, Estimate> {
         BTreeMap::new()
     }
 
-    fn stop(&mut self, _: tagalong_core::TrackId) {}
+    fn stop(&mut self, _: TrackId) {}
 }
 
 impl Associator for Idle {
-    fn fits(&self, _: &tagalong_core::Track, _: &Detection, _: &tagalong_core::Gate) -> bool {
+    fn fits(&self, _: &Track, _: &Detection, _: &Gate) -> bool {
         false
     }
 
-    fn associate(
-        &mut self,
-        _: &[tagalong_core::Track],
-        _: &[Detection],
-        _: &tagalong_core::Gate,
-    ) -> tagalong_core::Associations {
-        tagalong_core::Associations::default()
+    fn associate(&mut self, _: &[Track], _: &[Detection], _: &Gate) -> Associations {
+        Associations::default()
     }
 }
 
 impl TrackManager for Idle {
-    fn initiate(
-        &mut self,
-        _: tagalong_core::TrackId,
-        _: &tagalong_core::Unassociated<'_>,
-    ) -> tagalong_core::Initiation {
-        tagalong_core::Initiation::Drop("idle")
+    fn initiate(&mut self, _: TrackId, _: &Unassociated<'_>) -> Initiation {
+        Initiation::Drop("idle")
     }
 
-    fn manage(&mut self, _: &[tagalong_core::ObservedTrack<'_>]) -> tagalong_core::TrackChanges {
-        tagalong_core::TrackChanges::default()
+    fn manage(&mut self, _: &[ObservedTrack<'_>]) -> TrackChanges {
+        TrackChanges::default()
     }
 }
 
 impl Controller for Idle {
-    fn command(&mut self, _: &tagalong_core::Scene<'_>) -> tagalong_core::Twist {
-        tagalong_core::Twist::STOP
+    fn command(&mut self, _: &Scene<'_>) -> Twist {
+        Twist::STOP
     }
 }
 

@@ -96,14 +96,19 @@ fn remedy(camera: &Camera) -> String {
 
 #[cfg(test)]
 mod tests {
-    use tagalong_geometry::{Distortion, Pinhole};
+    use tagalong_geometry::Pinhole;
 
     use super::*;
 
     fn camera(height_m: f64, pitch_deg: f64) -> Camera {
-        let lens =
-            Pinhole { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
-        Camera::mounted(lens, 640, 480, height_m, f64::to_radians(pitch_deg), 0.0)
+        Camera::mounted(
+            Pinhole::centred(525.0, 640, 480),
+            640,
+            480,
+            height_m,
+            f64::to_radians(pitch_deg),
+            0.0,
+        )
     }
 
     /// Half the view is atan(240 / 525) = 24.6 degrees.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry2, Point2, Point3, Vector2, Vector3};
 use tagalong_core::{DepthImage, EgoMotion, Frame, Images, Stamp};
-use tagalong_geometry::{Camera, Distortion, Pinhole};
+use tagalong_geometry::{Camera, Pinhole};
 use tagalong_log::LogFrame;
 
 use super::Views;
@@ -73,9 +73,7 @@ impl Room {
     pub fn frame(&self, number: u64, speed_mps: f64) -> LogFrame {
         let seconds = 0.1 * number as f64;
         let travel = speed_mps * seconds;
-        let lens =
-            Pinhole { fx: 130.0, fy: 130.0, cx: 79.5, cy: 59.5, distortion: Distortion::None };
-        let camera = Camera::mounted(lens, 160, 120, 1.2, 0.0, 0.0);
+        let camera = Camera::mounted(Pinhole::centred(130.0, 160, 120), 160, 120, 1.2, 0.0, 0.0);
         let depth = DepthImage::from_fn(160, 120, |x, y| {
             self.depth(&camera, Point2::new(x as f64, y as f64), travel, seconds) as f32
         });

@@ -7,7 +7,7 @@ use tagalong_core::{
     DepthImage, EgoMotion, Frame, Images, Input, MAX_ODOMETRY_GAP_S, ObstacleReadings, RightImage,
     Sensors, Stamp, planar_pose,
 };
-use tagalong_geometry::{Camera, ConicalMirror, Distortion, Lens, Panorama, Pinhole};
+use tagalong_geometry::{Camera, ConicalMirror, Lens, Panorama, Pinhole};
 use tagalong_vision::Unwrapping;
 
 use super::LogFrame;
@@ -634,12 +634,5 @@ fn read<T>(
 
 /// Returns a lens with a horizontal field of view of 53 degrees, for logs without a calibration.
 fn assumed_lens(width: usize, height: usize) -> Pinhole {
-    Pinhole {
-        fx: width as f64,
-        fy: width as f64,
-        // Pixel centres have whole coordinates.
-        cx: 0.5 * (width as f64 - 1.0),
-        cy: 0.5 * (height as f64 - 1.0),
-        distortion: Distortion::None,
-    }
+    Pinhole::centred(width as f64, width, height)
 }

@@ -2,22 +2,22 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry2, Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Joints, Stamp, Track, TrackId, WheelSpeeds};
+use tagalong_core::{Joints, Stamp, Track, TrackId, WheelSpeeds, settings};
 use tagalong_geometry::{Camera, Rect};
 
-/// Settings of the output, `[output]` of a config.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-#[non_exhaustive]
-pub struct OutputSettings {
-    /// Time for which confirmed tracks stay in `tracks.csv` while unseen, s. With 0 a track is
-    /// written only in frames in which the person was seen.
-    #[schemars(range(min = 0.0))]
-    pub report_unseen_s: f64,
-    /// Part of a person that boxes in `tracks.csv` and in the images of `tracks.mcap` enclose:
-    /// `upper`, head and shoulders, as they are tracked; `full`, the whole person, whose feet are on
-    /// the floor below the head.
-    pub boxes: BoxedPart,
+settings! {
+    /// Settings of the output, `[output]` of a config.
+    #[non_exhaustive]
+    pub struct OutputSettings {
+        /// Time for which confirmed tracks stay in `tracks.csv` while unseen, s. With 0 a track is
+        /// written only in frames in which the person was seen.
+        #[schemars(range(min = 0.0))]
+        pub report_unseen_s: f64 = 0.0,
+        /// Part of a person that boxes in `tracks.csv` and in the images of `tracks.mcap` enclose:
+        /// `upper`, head and shoulders, as they are tracked; `full`, the whole person, whose feet
+        /// are on the floor below the head.
+        pub boxes: BoxedPart = BoxedPart::Upper,
+    }
 }
 
 /// Part of a person that reported boxes enclose.
@@ -31,12 +31,6 @@ pub enum BoxedPart {
     Upper,
     /// The whole person.
     Full,
-}
-
-impl Default for OutputSettings {
-    fn default() -> Self {
-        Self { report_unseen_s: 0.0, boxes: BoxedPart::Upper }
-    }
 }
 
 /// Contents of the files of a run about one frame.

@@ -2,11 +2,10 @@
 
 use nalgebra::{Point3, SMatrix, Vector2};
 use tagalong_core::{Estimate, Person, Track, TrackId};
-use tagalong_geometry::{Camera, Distortion, Pinhole};
+use tagalong_geometry::{Camera, Pinhole};
 
 pub(super) fn camera() -> Camera {
-    let lens = Pinhole { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
-    Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0)
+    Camera::mounted(Pinhole::centred(525.0, 640, 480), 640, 480, 1.2, 0.0, 0.0)
 }
 
 /// Returns a confirmed person three metres ahead and half a metre to the left.

@@ -10,7 +10,7 @@ use mcap::{Compression, WriteOptions, Writer};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use serde::Serialize;
 use tagalong_core::Stamp;
-use tagalong_geometry::{Camera, Distortion, Pinhole};
+use tagalong_geometry::{Camera, Pinhole};
 use tagalong_log::msgs::{
     CameraInfo, Header, Image, LaserScan, Message, Odometry, Pose, TFMessage, Transform,
     TransformStamped, encode,
@@ -244,14 +244,7 @@ pub fn info_of(frame: &str, camera: &Camera) -> CameraInfo {
 
 /// Returns a level camera at a height of 1.2 m.
 pub fn camera(width: usize, height: usize, focal: f64) -> Camera {
-    let lens = Pinhole {
-        fx: focal,
-        fy: focal,
-        cx: 0.5 * (width as f64 - 1.0),
-        cy: 0.5 * (height as f64 - 1.0),
-        distortion: Distortion::None,
-    };
-    Camera::mounted(lens, width, height, 1.2, 0.0, 0.0)
+    Camera::mounted(Pinhole::centred(focal, width, height), width, height, 1.2, 0.0, 0.0)
 }
 
 pub fn level_pose() -> Isometry3<f64> {

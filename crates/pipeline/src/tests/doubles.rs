@@ -13,7 +13,7 @@ use tagalong_core::{
     Input, Inputs, LaserScan, Likelihood, PerPerson, Person, PersonFilter, Query, Result, Scene,
     Stamp, Track, TrackId, Twist, Update, Verifier, WheelSpeeds,
 };
-use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole};
+use tagalong_geometry::{Camera, ImageBox, Pinhole};
 
 use crate::{FrameReport, Pipeline};
 
@@ -28,8 +28,7 @@ pub struct Config {
 }
 
 pub fn camera() -> Camera {
-    let lens = Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
-    Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0)
+    Camera::mounted(Pinhole::centred(500.0, 640, 480), 640, 480, 1.2, 0.0, 0.0)
 }
 
 pub fn frame(index: u64, t_s: f64) -> Frame {

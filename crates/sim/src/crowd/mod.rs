@@ -9,6 +9,7 @@ mod social_force;
 use nalgebra::{Point2, Vector2};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tagalong_core::settings;
 
 pub use block::Block;
 pub(crate) use route::Blocks;
@@ -38,36 +39,24 @@ impl Walk {
     }
 }
 
-/// Settings of all people with the walks `social-force` and `orca`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct CrowdSettings {
-    /// Radius of a body, m.
-    #[schemars(range(min = 0.1, max = 0.6))]
-    pub radius_m: f64,
-    /// Distance that the middle of a person keeps from the body of another, m; used by `orca`.
-    #[schemars(range(max = 2.0))]
-    pub safe_distance_m: f64,
-    /// Largest change of velocity, m/s².
-    #[schemars(range(min = 0.1, max = 20.0))]
-    pub acceleration_mps2: f64,
-    /// Time for which velocities are free of collisions with others, s; used by `orca`.
-    #[schemars(range(min = 0.2, max = 20.0))]
-    pub horizon_s: f64,
-    /// A point of the path counts as reached within this distance, m.
-    #[schemars(range(min = 0.1, max = 5.0))]
-    pub reached_m: f64,
-}
-
-impl Default for CrowdSettings {
-    fn default() -> Self {
-        Self {
-            radius_m: 0.3,
-            safe_distance_m: 0.5,
-            acceleration_mps2: 1.0,
-            horizon_s: 2.0,
-            reached_m: 0.5,
-        }
+settings! {
+    /// Settings of all people with the walks `social-force` and `orca`.
+    pub struct CrowdSettings {
+        /// Radius of a body, m.
+        #[schemars(range(min = 0.1, max = 0.6))]
+        pub radius_m: f64 = 0.3,
+        /// Distance that the middle of a person keeps from the body of another, m; used by `orca`.
+        #[schemars(range(max = 2.0))]
+        pub safe_distance_m: f64 = 0.5,
+        /// Largest change of velocity, m/s².
+        #[schemars(range(min = 0.1, max = 20.0))]
+        pub acceleration_mps2: f64 = 1.0,
+        /// Time for which velocities are free of collisions with others, s; used by `orca`.
+        #[schemars(range(min = 0.2, max = 20.0))]
+        pub horizon_s: f64 = 2.0,
+        /// A point of the path counts as reached within this distance, m.
+        #[schemars(range(min = 0.1, max = 5.0))]
+        pub reached_m: f64 = 0.5,
     }
 }
 

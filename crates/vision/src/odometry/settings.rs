@@ -1,7 +1,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_config::check_settings;
-use tagalong_core::{Error, Result};
+use tagalong_core::{Error, Result, settings};
 
 /// Data from which the motion is estimated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -14,76 +14,56 @@ pub enum MotionSource {
     Image,
 }
 
-/// Settings of the odometry that is corrected by images.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-#[non_exhaustive]
-pub struct OdometrySettings {
-    /// `depth`: static points of known depth correct the odometry of the log. `image`: corners of the
-    /// images alone, for a log without odometry and depth; of the settings below, `cell_px`,
-    /// `min_slope`, `min_points`, `scene_depth_m` and `settle_s` count then, and the others do not.
-    pub source: MotionSource,
-    /// Side of the square cells that yield at most one point each, px.
-    #[schemars(range(min = 8, max = 256))]
-    pub cell_px: usize,
-    /// Minimum change of brightness from pixel to pixel at a point, grey levels of 255.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub min_slope: f64,
-    /// Minimum depth of a point, m: near things move more often than walls.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub min_depth_m: f64,
-    /// Maximum depth of a point, m.
-    pub max_depth_m: f64,
-    /// Points at a person or behind one, within this distance of the line of sight, are left out,
-    /// m.
-    #[schemars(range(min = 0.0))]
-    pub person_m: f64,
-    /// Floor points within this distance of a person are left out because of the shadow, m.
-    #[schemars(range(min = 0.0))]
-    pub shadow_m: f64,
-    /// Minimum number of points; with fewer the odometry of the log is left as it is.
-    #[schemars(range(min = 8))]
-    pub min_points: usize,
-    /// Distance from the keyframe beyond which a new one is taken, m.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub max_travel_m: f64,
-    /// Turn from the keyframe beyond which a new one is taken, degrees.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub max_turn_deg: f64,
-    /// Standard deviation of the path by wheel odometry, as a fraction of the path.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub wheel_error: f64,
-    /// Standard deviation of the heading by wheel odometry, rad per metre of the path.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub heading_error_per_m: f64,
-    /// `image`: assumed depth of the scene behind the people, m. Images that grow tell how far the
-    /// robot went ahead as a fraction of it.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub scene_depth_m: f64,
-    /// `image`: time constant with which a camera that nods or rolls is believed to return to its
-    /// mount, s, because small errors add up.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub settle_s: f64,
-}
-
-impl Default for OdometrySettings {
-    fn default() -> Self {
-        Self {
-            source: MotionSource::Depth,
-            cell_px: 24,
-            min_slope: 5.0,
-            min_depth_m: 0.8,
-            max_depth_m: 10.0,
-            person_m: 0.55,
-            shadow_m: 2.0,
-            min_points: 12,
-            max_travel_m: 0.4,
-            max_turn_deg: 10.0,
-            wheel_error: 0.01,
-            heading_error_per_m: 0.05,
-            scene_depth_m: 8.0,
-            settle_s: 5.0,
-        }
+settings! {
+    /// Settings of the odometry that is corrected by images.
+    #[non_exhaustive]
+    pub struct OdometrySettings {
+        /// `depth`: static points of known depth correct the odometry of the log. `image`: corners
+        /// of the images alone, for a log without odometry and depth; of the settings below,
+        /// `cell_px`, `min_slope`, `min_points`, `scene_depth_m` and `settle_s` count then, and the
+        /// others do not.
+        pub source: MotionSource = MotionSource::Depth,
+        /// Side of the square cells that yield at most one point each, px.
+        #[schemars(range(min = 8, max = 256))]
+        pub cell_px: usize = 24,
+        /// Minimum change of brightness from pixel to pixel at a point, grey levels of 255.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        pub min_slope: f64 = 5.0,
+        /// Minimum depth of a point, m: near things move more often than walls.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        pub min_depth_m: f64 = 0.8,
+        /// Maximum depth of a point, m.
+        pub max_depth_m: f64 = 10.0,
+        /// Points at a person or behind one, within this distance of the line of sight, are left
+        /// out, m.
+        #[schemars(range(min = 0.0))]
+        pub person_m: f64 = 0.55,
+        /// Floor points within this distance of a person are left out because of the shadow, m.
+        #[schemars(range(min = 0.0))]
+        pub shadow_m: f64 = 2.0,
+        /// Minimum number of points; with fewer the odometry of the log is left as it is.
+        #[schemars(range(min = 8))]
+        pub min_points: usize = 12,
+        /// Distance from the keyframe beyond which a new one is taken, m.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        pub max_travel_m: f64 = 0.4,
+        /// Turn from the keyframe beyond which a new one is taken, degrees.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        pub max_turn_deg: f64 = 10.0,
+        /// Standard deviation of the path by wheel odometry, as a fraction of the path.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        pub wheel_error: f64 = 0.01,
+        /// Standard deviation of the heading by wheel odometry, rad per metre of the path.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        pub heading_error_per_m: f64 = 0.05,
+        /// `image`: assumed depth of the scene behind the people, m. Images that grow tell how far
+        /// the robot went ahead as a fraction of it.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        pub scene_depth_m: f64 = 8.0,
+        /// `image`: time constant with which a camera that nods or rolls is believed to return to
+        /// its mount, s, because small errors add up.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        pub settle_s: f64 = 5.0,
     }
 }
 

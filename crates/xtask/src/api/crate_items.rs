@@ -5,9 +5,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
-use syn::{Item, ItemImpl, ItemUse, Type, UseTree};
+use syn::{Item, ItemImpl, ItemStruct, ItemUse, Type, UseTree, parse_quote};
 
-use super::text::{implementation, is_public, is_test, kind, lines, text};
+use super::text::{implementation, is_exported, is_public, is_test, kind, lines, text};
 
 /// Path of a module inside its crate.
 type ModulePath = Vec<String>;
@@ -17,6 +17,8 @@ pub struct CrateItems {
     modules: BTreeMap<ModulePath, Vec<Item>>,
     /// Implementations, by the last name of their type.
     implementations: BTreeMap<String, Vec<ItemImpl>>,
+    /// Exported macros, which users find at the root.
+    macros: Vec<Item>,
 }
 
 impl CrateItems {
@@ -25,7 +27,8 @@ impl CrateItems {
     /// # Errors
     /// A file that is missing or no Rust.
     pub fn read(root: &Path) -> Result<Self> {
-        let mut this = Self { modules: BTreeMap::new(), implementations: BTreeMap::new() };
+        let mut this =
+            Self { modules: BTreeMap::new(), implementations: BTreeMap::new(), macros: Vec::new() };
         let folder = root.parent().context("a root file is in a folder")?;
         this.read_file(root, folder, Vec::new())?;
         Ok(this)
@@ -58,6 +61,13 @@ impl CrateItems {
                         self.implementations.entry(name).or_default().push(item);
                     }
                 }
+                Item::Macro(item) if item.mac.path.is_ident("settings") => {
+                    let settings: ItemStruct = item.mac.parse_body()?;
+                    kept.push(Item::Struct(self.expand_settings(settings)));
+                }
+                Item::Macro(item) if is_exported(&item.attrs) => {
+                    self.macros.push(Item::Macro(item));
+                }
                 item => kept.push(item),
             }
         }
@@ -65,11 +75,26 @@ impl CrateItems {
         Ok(())
     }
 
+    /// Adds to settings what `tagalong_core::settings!` adds to them.
+    fn expand_settings(&mut self, mut settings: ItemStruct) -> ItemStruct {
+        let name = &settings.ident;
+        let default = parse_quote!(impl Default for #name {});
+        self.implementations.entry(name.to_string()).or_default().push(default);
+        settings.attrs.insert(
+            0,
+            parse_quote!(#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]),
+        );
+        settings
+    }
+
     /// Returns a line for each public item and each of its public parts, sorted.
     pub fn public(&self) -> Vec<String> {
-        let mut lines = BTreeSet::new();
-        self.list(&Vec::new(), "", &mut lines);
-        lines.into_iter().collect()
+        let mut listed = BTreeSet::new();
+        self.list(&Vec::new(), "", &mut listed);
+        for item in &self.macros {
+            listed.extend(name_of(item).into_iter().flat_map(|(name, _)| lines(item, &name)));
+        }
+        listed.into_iter().collect()
     }
 
     /// Adds the public items of a module that users find under `shown`.

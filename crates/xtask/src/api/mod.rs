@@ -114,6 +114,8 @@ mod tests {
                      impl Kept { pub fn a(&self) -> f64 { self.a } fn b(&self) {} }\n\
                      impl Clone for Kept { fn clone(&self) -> Self { Self { ..*self } } }\n";
         let deep = "/// Words.\n#[derive(Debug)]\n#[non_exhaustive]\npub enum Deep { A(u8), B { x: f64 } }\n\
+                    settings! { #[non_exhaustive]\npub struct Wishes { pub a: f64 = 0.5, pub b: u8 } }\n\
+                    #[macro_export]\nmacro_rules! deepen { () => {} }\n\
                     #[cfg(test)]\nmod tests { pub fn unseen() {} }\n";
         let open = "pub const MOST: usize = 3;\npub(crate) const LEAST: usize = 1;\n\
                     pub trait Verb { const N: usize; fn act(&mut self, at: &[f64]) -> Option<u8> { None } }\n";
@@ -121,6 +123,8 @@ mod tests {
             [("lib.rs", lib), ("inner/mod.rs", inner), ("inner/deep.rs", deep), ("open.rs", open)];
         let expected = [
             "impl Clone for Named",
+            "impl Default for Wishes",
+            "macro deepen!",
             "pub const open::MOST: usize",
             "pub enum Deep #[derive(Debug)] #[non_exhaustive]",
             "pub enum Deep: A(u8)",
@@ -130,6 +134,9 @@ mod tests {
             "pub struct Named: a: f64",
             "pub struct Named: fn a(&self) -> f64",
             "pub struct Named: private fields",
+            "pub struct Wishes #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)] #[non_exhaustive]",
+            "pub struct Wishes: a: f64",
+            "pub struct Wishes: b: u8",
             "pub trait open::Verb",
             "pub trait open::Verb: const N: usize",
             "pub trait open::Verb: fn act(&mut self, at: &[f64]) -> Option<u8> {..}",

@@ -47,6 +47,11 @@ pub fn is_test(attributes: &[Attribute]) -> bool {
     attributes.iter().any(|attribute| text(attribute) == "#[cfg(test)]")
 }
 
+/// Returns whether a macro is one for users of the crate.
+pub fn is_exported(attributes: &[Attribute]) -> bool {
+    attributes.iter().any(|attribute| attribute.path().is_ident("macro_export"))
+}
+
 /// Returns the attributes that users depend on, each behind a space.
 fn attributes(attributes: &[Attribute]) -> String {
     attributes
@@ -91,9 +96,7 @@ pub fn lines(item: &Item, path: &str) -> Vec<String> {
             std::iter::once(head + &attributes(&item.attrs)).chain(variants).collect()
         }
         Item::Trait(item) => trait_lines(item, path),
-        Item::Macro(item) if item.attrs.iter().any(|a| a.path().is_ident("macro_export")) => {
-            vec![format!("macro {path}!")]
-        }
+        Item::Macro(item) if is_exported(&item.attrs) => vec![format!("macro {path}!")],
         _ => Vec::new(),
     }
 }

@@ -1,6 +1,7 @@
 use crate::StageSettings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tagalong_core::settings;
 
 /// Source of the box at which a track is expected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -13,47 +14,32 @@ pub enum Motion {
     Predicted,
 }
 
-/// Settings of the associator `associate-buffered`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Config {
-    /// In the first stage each side of a box is enlarged by this fraction of it ...
-    #[schemars(range(min = 0.0, max = 10.0))]
-    pub buffer: f64,
-    /// ... and the overlap (IoU) of the enlarged boxes is at least this.
-    #[schemars(range(min = 1e-6, max = 1.0))]
-    pub min_overlap: f64,
-    /// The fraction in the second stage, for tracks and detections that are left ...
-    #[schemars(range(min = 0.0, max = 10.0))]
-    pub second_buffer: f64,
-    /// ... and the smallest overlap there; above 1 there is no such stage.
-    #[schemars(range(min = 1e-6, max = 2.0))]
-    pub second_overlap: f64,
-    /// Source of the box at which a track is expected.
-    pub motion: Motion,
-    /// Age of the oldest observation of which the mean velocity is taken, frames.
-    #[schemars(range(min = 1, max = 1000))]
-    pub motion_frames: u32,
-    /// Smallest overlap of a weak detection and a track that is left, with the second buffer; above
-    /// 1 weak detections are not used.
-    #[schemars(range(min = 1e-6, max = 2.0))]
-    pub weak_overlap: f64,
-    /// Order of detections and tracks, and the part of the appearance.
-    #[serde(flatten)]
-    pub stages: StageSettings,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self {
-            buffer: 0.3,
-            min_overlap: 0.3,
-            second_buffer: 0.4,
-            second_overlap: 0.3,
-            motion: Motion::Observed,
-            motion_frames: 5,
-            weak_overlap: 0.5,
-            stages: StageSettings::default(),
-        }
+settings! {
+    /// Settings of the associator `associate-buffered`.
+    pub struct Config {
+        /// In the first stage each side of a box is enlarged by this fraction of it ...
+        #[schemars(range(min = 0.0, max = 10.0))]
+        pub buffer: f64 = 0.3,
+        /// ... and the overlap (IoU) of the enlarged boxes is at least this.
+        #[schemars(range(min = 1e-6, max = 1.0))]
+        pub min_overlap: f64 = 0.3,
+        /// The fraction in the second stage, for tracks and detections that are left ...
+        #[schemars(range(min = 0.0, max = 10.0))]
+        pub second_buffer: f64 = 0.4,
+        /// ... and the smallest overlap there; above 1 there is no such stage.
+        #[schemars(range(min = 1e-6, max = 2.0))]
+        pub second_overlap: f64 = 0.3,
+        /// Source of the box at which a track is expected.
+        pub motion: Motion = Motion::Observed,
+        /// Age of the oldest observation of which the mean velocity is taken, frames.
+        #[schemars(range(min = 1, max = 1000))]
+        pub motion_frames: u32 = 5,
+        /// Smallest overlap of a weak detection and a track that is left, with the second buffer;
+        /// above 1 weak detections are not used.
+        #[schemars(range(min = 1e-6, max = 2.0))]
+        pub weak_overlap: f64 = 0.5,
+        /// Order of detections and tracks, and the part of the appearance.
+        #[serde(flatten)]
+        pub stages: StageSettings,
     }
 }

@@ -1,36 +1,23 @@
 use crate::GateSettings;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use tagalong_core::settings;
 
-/// Settings of the associator `associate-jpda`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Config {
-    /// Probability that a visible person is detected in a frame.
-    #[schemars(range(min = 0.01, max = 0.999))]
-    pub detection_probability: f64,
-    /// False detections in a cubic metre and a frame.
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub clutter_per_m3: f64,
-    /// Pairs that are less probable are left out.
-    #[schemars(range(min = 1e-6, max = 0.5))]
-    pub min_weight: f64,
-    /// Most detections in a cluster of tracks; 1 to 16. The work doubles with each.
-    #[schemars(range(min = 1, max = 16))]
-    pub max_detections: u32,
-    /// Gate in metres, and the part of the appearance.
-    #[serde(flatten)]
-    pub gating: GateSettings,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self {
-            detection_probability: 0.9,
-            clutter_per_m3: 0.05,
-            min_weight: 0.05,
-            max_detections: 12,
-            gating: GateSettings::default(),
-        }
+settings! {
+    /// Settings of the associator `associate-jpda`.
+    pub struct Config {
+        /// Probability that a visible person is detected in a frame.
+        #[schemars(range(min = 0.01, max = 0.999))]
+        pub detection_probability: f64 = 0.9,
+        /// False detections in a cubic metre and a frame.
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        pub clutter_per_m3: f64 = 0.05,
+        /// Pairs that are less probable are left out.
+        #[schemars(range(min = 1e-6, max = 0.5))]
+        pub min_weight: f64 = 0.05,
+        /// Most detections in a cluster of tracks; 1 to 16. The work doubles with each.
+        #[schemars(range(min = 1, max = 16))]
+        pub max_detections: u32 = 12,
+        /// Gate in metres, and the part of the appearance.
+        #[serde(flatten)]
+        pub gating: GateSettings,
     }
 }

@@ -1,7 +1,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_config::check_settings;
-use tagalong_core::{Error, Result};
+use tagalong_core::{Error, Result, settings};
 
 /// Way to the target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -15,80 +15,58 @@ pub enum Path {
     C,
 }
 
-/// Settings of the controller `arc-follow`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Config {
-    /// The way to the target: "A" on a circle, "B" turn first and then
-    /// straight, "C" turn while driving.
-    pub path: Path,
-    /// Divisor of the radius of the circle on path C: 1.5 to 2.5 for usual
-    /// fields of view. No unit.
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub path_gain: f64,
-    /// Distance kept from the person, m, on the floor.
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub stand_off_m: f64,
-    /// Speed for each metre beyond the stand-off, 1/s.
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub range_gain_per_s: f64,
-    /// Speeds up by at most this much, m/s².
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub max_acceleration: f64,
-    /// Slows down by at most this much, m/s².
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub max_deceleration: f64,
-    /// Turning for each radian of bearing while the robot stands, 1/s; it
-    /// fades as the robot drives faster.
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub bearing_gain_per_s: f64,
-    /// Turns no faster than this, rad/s.
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub max_turn_rate: f64,
-    /// Largest curvature of the path, 1/m.
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub max_curvature: f64,
-    /// A target nearer than this steers as if it were this far away, m.
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub min_range_m: f64,
-    /// Paths A and C stop and turn on the spot while the bearing exceeds the
-    /// second of these angles, and until it is below the first, degrees.
-    pub turn_in_place_deg: [f64; 2],
-    /// The same for path B, which steers in no other way, degrees.
-    pub align_deg: [f64; 2],
-    /// Steers to where the person went, this far ahead, m, instead of straight to the
-    /// person: through the middle of doors and round corners. 0 is off.
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub trail_m: f64,
-    /// Drives after a person that is not seen for half of this time, then slows down, and stands
-    /// still at the end of it, s.
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub max_unseen_s: f64,
-    /// From the capture of an image until the wheels answer to it, s: the
-    /// target is predicted by as much.
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub latency_s: f64,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self {
-            path: Path::C,
-            path_gain: 2.0,
-            stand_off_m: 1.4,
-            range_gain_per_s: 0.8,
-            max_acceleration: 0.5,
-            max_deceleration: 1.0,
-            bearing_gain_per_s: 1.0,
-            max_turn_rate: 1.2,
-            max_curvature: 3.0,
-            min_range_m: 0.5,
-            turn_in_place_deg: [30.0, 60.0],
-            align_deg: [3.0, 12.0],
-            trail_m: 0.0,
-            max_unseen_s: 1.0,
-            latency_s: 0.1,
-        }
+settings! {
+    /// Settings of the controller `arc-follow`.
+    pub struct Config {
+        /// The way to the target: "A" on a circle, "B" turn first and then
+        /// straight, "C" turn while driving.
+        pub path: Path = Path::C,
+        /// Divisor of the radius of the circle on path C: 1.5 to 2.5 for usual
+        /// fields of view. No unit.
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        pub path_gain: f64 = 2.0,
+        /// Distance kept from the person, m, on the floor.
+        #[schemars(range(min = 0.0, max = 1e6))]
+        pub stand_off_m: f64 = 1.4,
+        /// Speed for each metre beyond the stand-off, 1/s.
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        pub range_gain_per_s: f64 = 0.8,
+        /// Speeds up by at most this much, m/s².
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        pub max_acceleration: f64 = 0.5,
+        /// Slows down by at most this much, m/s².
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        pub max_deceleration: f64 = 1.0,
+        /// Turning for each radian of bearing while the robot stands, 1/s; it
+        /// fades as the robot drives faster.
+        #[schemars(range(min = 0.0, max = 1e6))]
+        pub bearing_gain_per_s: f64 = 1.0,
+        /// Turns no faster than this, rad/s.
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        pub max_turn_rate: f64 = 1.2,
+        /// Largest curvature of the path, 1/m.
+        #[schemars(range(min = 0.0, max = 1e6))]
+        pub max_curvature: f64 = 3.0,
+        /// A target nearer than this steers as if it were this far away, m.
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        pub min_range_m: f64 = 0.5,
+        /// Paths A and C stop and turn on the spot while the bearing exceeds the
+        /// second of these angles, and until it is below the first, degrees.
+        pub turn_in_place_deg: [f64; 2] = [30.0, 60.0],
+        /// The same for path B, which steers in no other way, degrees.
+        pub align_deg: [f64; 2] = [3.0, 12.0],
+        /// Steers to where the person went, this far ahead, m, instead of straight to the
+        /// person: through the middle of doors and round corners. 0 is off.
+        #[schemars(range(min = 0.0, max = 1e6))]
+        pub trail_m: f64 = 0.0,
+        /// Drives after a person that is not seen for half of this time, then slows down, and
+        /// stands still at the end of it, s.
+        #[schemars(range(min = 1e-6, max = 1e6))]
+        pub max_unseen_s: f64 = 1.0,
+        /// From the capture of an image until the wheels answer to it, s: the
+        /// target is predicted by as much.
+        #[schemars(range(min = 0.0, max = 1e6))]
+        pub latency_s: f64 = 0.1,
     }
 }
 

@@ -9,7 +9,7 @@ use tagalong_core::{
     Controller, DepthImage, DiffDrive, EgoMotion, Frame, Images, LaserScan, Scene, Stamp, Track,
     Twist, WheelSpeeds,
 };
-use tagalong_geometry::{Camera, Distortion, Pinhole};
+use tagalong_geometry::{Camera, Pinhole};
 
 use crate::clear_follow::{ClearFollow, Config};
 
@@ -17,8 +17,7 @@ const WHEELS: DiffDrive = DiffDrive { half_separation_m: 0.167, slip: 0.0 };
 const MAX_MPS: f64 = 0.9;
 
 fn camera() -> Arc<Camera> {
-    let lens = Pinhole { fx: 30.0, fy: 30.0, cx: 19.5, cy: 14.5, distortion: Distortion::None };
-    Arc::new(Camera::mounted(lens, 40, 30, 1.0, 0.0, 0.0))
+    Arc::new(Camera::mounted(Pinhole::centred(30.0, 40, 30), 40, 30, 1.0, 0.0, 0.0))
 }
 
 fn command(

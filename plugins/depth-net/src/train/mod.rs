@@ -302,15 +302,14 @@ mod tests {
     use nalgebra::Point3;
     use tagalong_conformance::figure::{Figure, World};
     use tagalong_core::{EgoMotion, Stamp};
-    use tagalong_geometry::{Camera, Distortion, Pinhole};
+    use tagalong_geometry::{Camera, Pinhole};
 
     use super::*;
 
     /// Adds a frame with a person 2.5 m away, or with none.
     fn add(trainer: &mut DepthNetTrainer, is_person: bool, room: Option<&str>, group: u64) {
-        let lens =
-            Pinhole { fx: 125.0, fy: 125.0, cx: 79.5, cy: 59.5, distortion: Distortion::None };
-        let camera = Arc::new(Camera::mounted(lens, 160, 120, 1.2, 0.0, 0.0));
+        let camera =
+            Arc::new(Camera::mounted(Pinhole::centred(125.0, 160, 120), 160, 120, 1.2, 0.0, 0.0));
         let figures = if is_person { vec![Figure::at(2.5, 0.4)] } else { Vec::new() };
         let images = World::with(&figures).draw(&camera);
         let frame = Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), images);

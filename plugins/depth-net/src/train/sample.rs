@@ -183,14 +183,13 @@ mod tests {
 
     use tagalong_conformance::figure::{Figure, World};
     use tagalong_core::{EgoMotion, Stamp};
-    use tagalong_geometry::{Distortion, Pinhole};
+    use tagalong_geometry::Pinhole;
 
     use super::*;
 
     fn sample() -> Sample {
-        let lens =
-            Pinhole { fx: 250.0, fy: 250.0, cx: 159.5, cy: 119.5, distortion: Distortion::None };
-        let camera = Arc::new(Camera::mounted(lens, 320, 240, 1.2, 0.0, 0.0));
+        let camera =
+            Arc::new(Camera::mounted(Pinhole::centred(250.0, 320, 240), 320, 240, 1.2, 0.0, 0.0));
         let images = World::with(&[Figure::at(2.5, 0.4)]).draw(&camera);
         let frame = Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), images);
         let head = Point3::new(2.5, 0.4, 1.6);

@@ -132,7 +132,7 @@ mod tests {
     use nalgebra::Point3;
     use tagalong_config::AnnotatedPerson;
     use tagalong_core::{DepthImage, EgoMotion, Frame, Images, Stamp};
-    use tagalong_geometry::{Camera, Distortion, Pinhole};
+    use tagalong_geometry::{Camera, Pinhole};
 
     use super::*;
 
@@ -145,9 +145,8 @@ mod tests {
                 .with_visible(*visible)
         }
 
-        let lens =
-            Pinhole { fx: 120.0, fy: 120.0, cx: 159.5, cy: 119.5, distortion: Distortion::None };
-        let camera = Arc::new(Camera::mounted(lens, 320, 240, 1.1, 0.0, 0.0));
+        let camera =
+            Arc::new(Camera::mounted(Pinhole::centred(120.0, 320, 240), 320, 240, 1.1, 0.0, 0.0));
         let depth = Some(Arc::new(DepthImage::filled(320, 240, 3.0)));
         let images = Images { depth, ..Images::default() };
         let frame = Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), images);

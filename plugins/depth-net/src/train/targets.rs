@@ -212,14 +212,14 @@ mod tests {
             AnnotatedPerson::new(nalgebra::Point3::new(x, y, 1.6))
         }
 
-        let lens = tagalong_geometry::Pinhole {
-            fx: 120.0,
-            fy: 120.0,
-            cx: 159.5,
-            cy: 119.5,
-            distortion: tagalong_geometry::Distortion::None,
-        };
-        let camera = Camera::mounted(lens, 320, 240, 1.1, 0.0, 0.0);
+        let camera = Camera::mounted(
+            tagalong_geometry::Pinhole::centred(120.0, 320, 240),
+            320,
+            240,
+            1.1,
+            0.0,
+            0.0,
+        );
         let people = [person(3.0, 0.0), person(3.0, 1.5), person(5.0, 0.0)];
         let found = surfaces_m2(&people, &camera, &DepthImage::filled(320, 240, 3.0));
         assert!((found[0] - 0.9).abs() < 0.1 && (found[1] - 0.9).abs() < 0.1, "{found:?}");

@@ -1,13 +1,12 @@
 use nalgebra::{Point3, Vector2};
 use proptest::prelude::*;
 use tagalong_core::{DepthImage, EgoMotion, Images, Stamp};
-use tagalong_geometry::{Distortion, Pinhole};
+use tagalong_geometry::Pinhole;
 
 use super::*;
 
 fn frame(pixels: Vec<f32>) -> Frame {
-    let lens = Pinhole { fx: 80.0, fy: 80.0, cx: 39.5, cy: 29.5, distortion: Distortion::None };
-    let camera = Arc::new(Camera::mounted(lens, 80, 60, 1.4, 0.1, 0.1));
+    let camera = Arc::new(Camera::mounted(Pinhole::centred(80.0, 80, 60), 80, 60, 1.4, 0.1, 0.1));
     let depth = DepthImage::from_pixels(80, 60, pixels).map(Arc::new);
     let images = Images { depth, ..Images::default() };
     Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), images)

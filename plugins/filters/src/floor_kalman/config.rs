@@ -2,7 +2,7 @@ use nalgebra::Matrix2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_config::check_settings;
-use tagalong_core::{Error, Result};
+use tagalong_core::{Error, Result, settings};
 
 /// Prediction of a person's next position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -28,62 +28,43 @@ pub enum Measurement {
     Polar,
 }
 
-/// Settings of the filter `floor-kalman`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Config {
-    /// Prediction of the next position: `still`, `last-difference` or `constant-velocity`.
-    pub form: Form,
-    /// Covariance of detections: `detection`, `fixed` or `polar`.
-    pub measurement: Measurement,
-    /// Q of the forms without velocity: xx, xy, yy in room axes, m² per `step_s`.
-    #[schemars(inner(range(min = -999_999, max = 999_999)))]
-    pub process_m2: [f64; 3],
-    /// The time between two images to which Q belongs, s.
-    #[schemars(range(min = 1e-3, max = 1e3))]
-    pub step_s: f64,
-    /// R of `fixed`: xx, xy, yy in room axes, m².
-    #[schemars(inner(range(min = -999_999, max = 999_999)))]
-    pub measurement_m2: [f64; 3],
-    /// Of `polar`: standard deviation of the range at the robot, m.
-    #[schemars(range(min = 1e-3, max = 1e3))]
-    pub sigma_range_m: f64,
-    /// Of `polar`: increase per metre of range, m.
-    #[schemars(range(min = 0.0, max = 1e3))]
-    pub sigma_range_per_m: f64,
-    /// Of `polar`: standard deviation of the bearing, degrees.
-    #[schemars(range(min = 1e-3, max = 1e3))]
-    pub sigma_bearing_deg: f64,
-    /// Of `constant-velocity`: spectral density of the white acceleration, m²/s³.
-    #[schemars(range(min = 1e-6, max = 1e3))]
-    pub acceleration_noise: f64,
-    /// Standard deviation of a newcomer's velocity components, m/s.
-    #[schemars(range(min = 1e-3, max = 1e3))]
-    pub initial_speed_mps: f64,
-    /// Random walk of the height of the head, m per square root of a second.
-    #[schemars(range(min = 0.0, max = 1e3))]
-    pub height_noise: f64,
-    /// From the robot's heading at the start to the X axis of the room, degrees.
-    #[schemars(range(min = -360.0, max = 1e3))]
-    pub room_heading_deg: f64,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self {
-            form: Form::ConstantVelocity,
-            measurement: Measurement::Detection,
-            process_m2: [0.024, -0.001, 0.043],
-            step_s: 1.0 / 3.0,
-            measurement_m2: [0.011, -0.004, 0.020],
-            sigma_range_m: 0.05,
-            sigma_range_per_m: 0.03,
-            sigma_bearing_deg: 1.0,
-            acceleration_noise: 0.2,
-            initial_speed_mps: 1.0,
-            height_noise: 0.03,
-            room_heading_deg: 0.0,
-        }
+settings! {
+    /// Settings of the filter `floor-kalman`.
+    pub struct Config {
+        /// Prediction of the next position: `still`, `last-difference` or `constant-velocity`.
+        pub form: Form = Form::ConstantVelocity,
+        /// Covariance of detections: `detection`, `fixed` or `polar`.
+        pub measurement: Measurement = Measurement::Detection,
+        /// Q of the forms without velocity: xx, xy, yy in room axes, m² per `step_s`.
+        #[schemars(inner(range(min = -999_999, max = 999_999)))]
+        pub process_m2: [f64; 3] = [0.024, -0.001, 0.043],
+        /// The time between two images to which Q belongs, s.
+        #[schemars(range(min = 1e-3, max = 1e3))]
+        pub step_s: f64 = 1.0 / 3.0,
+        /// R of `fixed`: xx, xy, yy in room axes, m².
+        #[schemars(inner(range(min = -999_999, max = 999_999)))]
+        pub measurement_m2: [f64; 3] = [0.011, -0.004, 0.020],
+        /// Of `polar`: standard deviation of the range at the robot, m.
+        #[schemars(range(min = 1e-3, max = 1e3))]
+        pub sigma_range_m: f64 = 0.05,
+        /// Of `polar`: increase per metre of range, m.
+        #[schemars(range(min = 0.0, max = 1e3))]
+        pub sigma_range_per_m: f64 = 0.03,
+        /// Of `polar`: standard deviation of the bearing, degrees.
+        #[schemars(range(min = 1e-3, max = 1e3))]
+        pub sigma_bearing_deg: f64 = 1.0,
+        /// Of `constant-velocity`: spectral density of the white acceleration, m²/s³.
+        #[schemars(range(min = 1e-6, max = 1e3))]
+        pub acceleration_noise: f64 = 0.2,
+        /// Standard deviation of a newcomer's velocity components, m/s.
+        #[schemars(range(min = 1e-3, max = 1e3))]
+        pub initial_speed_mps: f64 = 1.0,
+        /// Random walk of the height of the head, m per square root of a second.
+        #[schemars(range(min = 0.0, max = 1e3))]
+        pub height_noise: f64 = 0.03,
+        /// From the robot's heading at the start to the X axis of the room, degrees.
+        #[schemars(range(min = -360.0, max = 1e3))]
+        pub room_heading_deg: f64 = 0.0,
     }
 }
 

@@ -140,16 +140,14 @@ impl Models {
 #[cfg(test)]
 mod tests {
     use nalgebra::{Matrix3, Point3};
-    use tagalong_geometry::{Distortion, ImageBox, Pinhole};
+    use tagalong_geometry::{ImageBox, Pinhole};
 
     use super::*;
 
     const DT_S: f64 = 0.1;
 
     fn camera() -> Camera {
-        let lens =
-            Pinhole { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
-        Camera::mounted(lens, 640, 480, 1.3, 0.0, 0.0)
+        Camera::mounted(Pinhole::centred(525.0, 640, 480), 640, 480, 1.3, 0.0, 0.0)
     }
 
     fn seen(y_m: f64) -> Detection {

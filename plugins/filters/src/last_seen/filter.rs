@@ -160,9 +160,7 @@ mod tests {
     }
 
     fn camera() -> Camera {
-        let lens =
-            Pinhole { fx: 300.0, fy: 300.0, cx: 159.5, cy: 119.5, distortion: Distortion::None };
-        Camera::mounted(lens, 320, 240, 1.2, 0.0, 0.0)
+        Camera::mounted(Pinhole::centred(300.0, 320, 240), 320, 240, 1.2, 0.0, 0.0)
     }
 
     /// Returns the estimate of a person detected each half second at these places, by a robot with

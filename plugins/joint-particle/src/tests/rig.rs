@@ -5,7 +5,7 @@ use tagalong_core::{
     Detection, EgoMotion, Estimate, Evidence, Filter, Frame, Images, Likelihood, Matched, Person,
     Result, RgbImage, Stamp, TrackId, Update,
 };
-use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
+use tagalong_geometry::{Camera, ImageBox, Pinhole, Rect};
 use tagalong_vision::Sketch;
 
 use crate::{Config, JointParticle};
@@ -43,8 +43,7 @@ impl Likelihood for Formula {
 
 /// A frame of a level camera 1.5 m above the robot's origin.
 pub fn frame(motion: EgoMotion, colour: Option<RgbImage>) -> Frame {
-    let lens = Pinhole { fx: 80.0, fy: 80.0, cx: 49.5, cy: 39.5, distortion: Distortion::None };
-    let camera = Arc::new(Camera::mounted(lens, 100, 80, 1.5, 0.0, 0.0));
+    let camera = Arc::new(Camera::mounted(Pinhole::centred(80.0, 100, 80), 100, 80, 1.5, 0.0, 0.0));
     let images = Images { colour: colour.map(Arc::new), ..Images::default() };
     Frame::new(1, Stamp::default(), camera, motion, images)
 }

@@ -73,6 +73,20 @@ pub fn code(output: &Output) -> i32 {
     output.status.code().expect("the program was not killed")
 }
 
+/// Returns what a command printed that succeeded.
+#[track_caller]
+pub fn results_of(output: &Output) -> String {
+    assert_eq!(code(output), 0, "{}", text(&output.stderr));
+    text(&output.stdout)
+}
+
+/// Returns what a command that ended with this exit code said beside its results.
+#[track_caller]
+pub fn messages_of(output: &Output, expected: i32) -> String {
+    assert_eq!(code(output), expected, "{}{}", text(&output.stdout), text(&output.stderr));
+    text(&output.stderr)
+}
+
 /// A config that tracks the nearest object.
 pub fn config(folder: &Path, extra: &str) -> PathBuf {
     let path = folder.join("nearest.toml");

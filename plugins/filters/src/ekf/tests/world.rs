@@ -3,7 +3,7 @@
 
 use nalgebra::{Isometry2, Matrix3, Point2, Point3, Rotation2, Vector2, Vector3};
 use tagalong_core::{Detection, EgoMotion, PersonFilter};
-use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
+use tagalong_geometry::{Camera, ImageBox, Pinhole, Rect};
 use tagalong_math::{RandomSource, SplitMix64};
 
 use crate::ekf::{Ekf, State};
@@ -22,8 +22,7 @@ pub fn normal3(random: &mut SplitMix64) -> Vector3<f64> {
 }
 
 pub fn camera() -> Camera {
-    let lens = Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
-    Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0)
+    Camera::mounted(Pinhole::centred(500.0, 640, 480), 640, 480, 1.2, 0.0, 0.0)
 }
 
 pub fn detection(position: Point3<f64>, sigma_m: f64) -> Detection {
