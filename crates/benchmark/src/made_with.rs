@@ -10,7 +10,7 @@ use toml::{Table, Value};
 use super::plan::Task;
 
 /// The table that is part of the program.
-const TABLE: &str = include_str!("made_with.toml");
+const TABLE: &str = include_str!("../configs/models/made-with.toml");
 
 /// Recordings by models, plugins and configs.
 #[derive(Deserialize)]

@@ -1,5 +1,5 @@
-//! Who a person is by the appearance that the target lock remembers: people who come back, in annotated
-//! logs of real rooms.
+//! Recognition of people by the appearance that the target lock remembers, after pauses in annotated logs of
+//! real rooms.
 
 mod sightings;
 mod ways;
@@ -42,7 +42,7 @@ const PAUSE_S: f64 = 3.0;
 /// Fewest sightings of a person that is known.
 const LEAST: usize = 3;
 
-/// A person who is seen again after a pause.
+/// Sighting of a person after a pause.
 struct Return {
     person: i64,
     /// Time since the last moment of learning, s.
@@ -72,9 +72,9 @@ type Answers = BTreeMap<i64, [u64; 2]>;
 /// Answers in a log.
 #[derive(Default)]
 struct Answered {
-    /// Who of the people known by then is it?
+    /// Choice of the person among all people known by then.
     who: Answers,
-    /// Which of the people in the image is the person?
+    /// Choice of the person among the people in the image.
     which: Answers,
     pauses_s: Vec<f64>,
     /// Number of people to choose from, for each answer to `who`.

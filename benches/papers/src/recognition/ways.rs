@@ -158,8 +158,8 @@ impl Known {
     }
 }
 
-/// Returns the log-odds of the lock with those of a classifier beside it, which takes nobody for the
-/// person whom the lock would not.
+/// Returns the log-odds of the lock with those of a classifier beside it: where the lock refuses a person,
+/// the classifier cannot accept them.
 fn beside(fixed: f64, learnt: f64) -> f64 {
     if fixed < 0.0 { fixed + learnt.min(0.0) } else { fixed + learnt }
 }
