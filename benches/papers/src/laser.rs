@@ -1,10 +1,10 @@
 //! People by their legs in a laser scan: two logs of the leg tracker benchmark with annotated
 //! people, beside its published figures.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry2, Isometry3, Point2, Point3};
 use tagalong_core::{Frame, Inputs, LaserScan, spatial_pose};
 use tagalong_eval::formats::floor::{self, Row as TruthRow};
 use tagalong_eval::{FloorClear, FloorPoint, FloorScan, FloorTally};
@@ -76,6 +76,11 @@ const SWEEP_COLUMNS: [&str; 9] = [
     "MOTP, m",
 ];
 
+/// Number of scans after which what is seen again is compared: about a second.
+const LAG: usize = 8;
+/// Points farther than this from all of the earlier scan are of something new, m.
+const NEAR_M: f64 = 0.3;
+
 /// Use of the times of single rays.
 #[derive(Clone, Copy, PartialEq)]
 enum Rays {
@@ -135,6 +140,10 @@ struct Moved {
     points: u64,
     sum_m: f64,
     most_m: f64,
+    /// Points of the last scans in the odometry frame: de-skewed, and as if measured at once.
+    earlier: VecDeque<[Vec<Point2<f64>>; 2]>,
+    /// Number and sum of the distances to the nearest point of an earlier scan, m, of both.
+    near: [(u64, f64); 2],
 }
 
 fn moving(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
@@ -220,23 +229,25 @@ fn at_once(lab: &Lab<'_>) -> Result<Findings, ReproduceError> {
         return Ok(MOVING.without_data().into());
     }
     let at_once = MOVING.track_all(lab, Rays::AtOnce)?;
+    let mut notes = MOVING.moved(lab)?.sentences();
+    notes.push(
+        "The people were annotated in scans that are not de-skewed. IDs: those of all estimates that \
+         count."
+            .into(),
+    );
     let mut rows = Vec::new();
     for (timed, at_once) in timed.iter().zip(&at_once) {
         rows.push(timed.sweep_row("de-skewed"));
         rows.push(at_once.sweep_row("as if measured at once"));
     }
     Ok(Table {
-        title: "Scans de-skewed by the odometry, or taken as measured at once (laser-moving, strict, \
+        title:
+            "Scans de-skewed by the odometry, or taken as measured at once (laser-moving, strict, \
                 0.75 m)"
-            .into(),
+                .into(),
         columns: SWEEP_COLUMNS.map(String::from).to_vec(),
         rows,
-        notes: vec![
-            MOVING.moved(lab)?.sentence(),
-            "The people were annotated in scans that are not de-skewed. IDs: those of all estimates \
-             that count."
-                .into(),
-        ],
+        notes,
     }
     .into())
 }
@@ -336,8 +347,7 @@ impl Log {
     }
 
     fn open(&self, log: &Path, inputs: Inputs) -> Result<FrameSource, ReproduceError> {
-        let source =
-            FrameSource::open(log, &InputSettings::default(), &Limits::default(), inputs);
+        let source = FrameSource::open(log, &InputSettings::default(), &Limits::default(), inputs);
         source.map_err(|error| ReproduceError::of(self.name, error))
     }
 
@@ -348,7 +358,7 @@ impl Log {
         let mut source = self.open(&log, Inputs::ANY)?;
         while let Some(item) = source.next_frame() {
             let scan = item.frame.scan().map_err(|error| ReproduceError::of(self.name, error))?;
-            moved.add(scan);
+            moved.add(scan, &item.odom_from_robot);
         }
         Ok(moved)
     }
@@ -505,7 +515,7 @@ impl Tracked {
 }
 
 impl Moved {
-    fn add(&mut self, scan: &LaserScan) {
+    fn add(&mut self, scan: &LaserScan, odom_from_robot: &Isometry2<f64>) {
         let skewed = points_at_once(scan);
         self.scans += 1;
         self.moved_scans += u32::from(scan.motion.is_some());
@@ -515,18 +525,50 @@ impl Moved {
             self.sum_m += by_m;
             self.most_m = self.most_m.max(by_m);
         }
+        let seen = [in_odom(&scan.points, odom_from_robot), in_odom(&skewed, odom_from_robot)];
+        if self.earlier.len() == LAG
+            && let Some(earlier) = self.earlier.pop_front()
+        {
+            for ((near, now), then) in self.near.iter_mut().zip(&seen).zip(&earlier) {
+                for distance_m in now.iter().filter_map(|point| nearest_m(point, then)) {
+                    near.0 += 1;
+                    near.1 += distance_m;
+                }
+            }
+        }
+        self.earlier.push_back(seen);
     }
 
-    fn sentence(&self) -> String {
-        format!(
-            "{} of {} scans are de-skewed, the others are of a robot that stands: points move by \
-             {:.3} m on average, and by {:.3} m at most.",
-            self.moved_scans,
-            self.scans,
-            self.sum_m / self.points.max(1) as f64,
-            self.most_m
-        )
+    fn sentences(&self) -> Vec<String> {
+        let [deskewed_mm, skewed_mm] =
+            self.near.map(|(number, sum_m)| 1000.0 * sum_m / number.max(1) as f64);
+        vec![
+            format!(
+                "{} of {} scans are de-skewed, the others are of a robot that stands: points move by \
+                 {:.3} m on average, and by {:.3} m at most.",
+                self.moved_scans,
+                self.scans,
+                self.sum_m / self.points.max(1) as f64,
+                self.most_m
+            ),
+            format!(
+                "Points are {deskewed_mm:.1} mm from the nearest one of the scan {LAG} scans before, de-skewed \
+                 both, and {skewed_mm:.1} mm as if measured at once, on average in the odometry frame, of \
+                 those within {NEAR_M} m."
+            ),
+        ]
     }
+}
+
+/// Returns the points of a scan on the floor of the odometry frame.
+fn in_odom(points: &[Point3<f64>], odom_from_robot: &Isometry2<f64>) -> Vec<Point2<f64>> {
+    points.iter().map(|point| odom_from_robot * point.xy()).collect()
+}
+
+/// Returns the distance to the nearest one of some points, m; `None` if none is near.
+fn nearest_m(point: &Point2<f64>, others: &[Point2<f64>]) -> Option<f64> {
+    let distances = others.iter().map(|other| (other - point).norm());
+    distances.min_by(f64::total_cmp).filter(|distance_m| *distance_m <= NEAR_M)
 }
 
 /// Returns the frame as it is without the times of single rays.
@@ -609,9 +651,15 @@ mod tests {
             assert!((point - Point3::new(2.1, 0.0, 0.3)).norm() < 1e-12, "{point}");
         }
         let mut moved = Moved::default();
-        moved.add(&scan);
+        for _ in 0..=LAG {
+            moved.add(&scan, &Isometry2::identity());
+        }
         assert!((moved.most_m - 6.56_f64.sqrt()).abs() < 1e-9, "{}", moved.most_m);
-        assert_eq!([moved.scans, moved.moved_scans], [1, 1]);
+        assert_eq!([moved.scans, moved.moved_scans], [LAG as u32 + 1; 2]);
+        assert_eq!(moved.near, [(2, 0.0), (2, 0.0)], "the last scan is the first one again");
+        let [here, beside] = [Point2::new(1.0, 0.0), Point2::new(1.0, 0.2)];
+        assert_eq!(nearest_m(&here, &[beside, Point2::new(9.0, 0.0)]), Some(0.2));
+        assert_eq!(nearest_m(&here, &[Point2::new(1.0, 0.4)]), None, "something new");
         let still = scan.with_motion(None);
         assert_eq!(points_at_once(&still), still.points.to_vec());
     }
