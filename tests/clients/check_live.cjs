@@ -45,6 +45,8 @@ const checkDrive = async (page) => {
   assert.match(lock[1], /^(initial|training|locked|suspect|lost|re-found)$/);
   assert.match(command[1], /^[a-z-]+$/);
   assert.ok(rows.every((row) => row[2].length > 5), "each state with its meaning");
+  const explained = await page.$eval('.above [data-layer="target"]', (mark) => mark.checkVisibility());
+  assert.ok(explained, "the legend explains the target");
 };
 
 const checkPause = async (page) => {

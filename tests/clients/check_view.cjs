@@ -157,6 +157,13 @@ const checkLayers = async (page, data) => {
   assert.equal(await explained(), true, "the legend explains dropped candidates");
 };
 
+// The legend of the plan explains the target where a controller has one.
+const checkTarget = async (page, data) => {
+  const drives = data.runs.some((run) => run.frames.some((frame) => frame && frame.drive));
+  const explained = await page.$eval('.above [data-layer="target"]', (mark) => mark.checkVisibility());
+  assert.equal(explained, drives, "the legend explains the target");
+};
+
 const visit = async (browser, { way, colorScheme, viewport }) => {
   const problems = [];
   const page = await openPage(browser, { colorScheme, viewport }, (asked) => asked === url, problems);
@@ -166,6 +173,7 @@ const visit = async (browser, { way, colorScheme, viewport }) => {
     await checkKeys(page, data.t.length - 1);
     await checkScrubbing(page, data);
     await checkEvents(page, data);
+    await checkTarget(page, data);
     if (data.image_px[0]) await checkLayers(page, data);
     if (data.image_px[0]) await checkQuestion(page, data);
     if (data.truth) await checkMissed(page, data);

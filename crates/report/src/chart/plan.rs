@@ -22,6 +22,9 @@ const NEAR: f64 = 1.5;
 /// Width and height of a digit of an ID with the room around it, on the picture.
 const DIGIT: [f64; 2] = [8.0, 12.0];
 
+/// Lower edges of an ID from the end of its track, first choice first, on the picture.
+const ROWS: [f64; 4] = [-5.0, 13.0, -17.0, 25.0];
+
 impl Extent {
     /// Returns the smallest square with a margin around all positions; `None` without any.
     pub fn around<'a>(all: impl IntoIterator<Item = &'a Trajectory>) -> Option<Self> {
@@ -59,13 +62,13 @@ pub fn plan(
 ) -> Markup {
     let ahead = Axis::new(Scale::Linear, extent.x_m, [PLOT.bottom, PLOT.top]);
     let left = Axis::new(Scale::Linear, extent.y_m, [PLOT.right, PLOT.left]);
-    let drawn: Vec<_> = tracks.iter().map(|track| lines(track, &left, &ahead)).collect();
+    let mut drawn = Vec::new();
     let mut taken = Vec::new();
-    let labels: Vec<_> = tracks
-        .iter()
-        .zip(&drawn)
-        .map(|(track, lines)| last_of(lines).map(|end| Label::free(end, track.id, &mut taken)))
-        .collect();
+    for track in tracks {
+        let lines = lines(track, &left, &ahead);
+        let label = last_of(&lines).map(|end| Label::free(end, track.id, &mut taken));
+        drawn.push((track, lines, label));
+    }
     let body = html! {
         (axes(PLOT, &left, &ahead, ["y: metres to the left", "x: metres ahead"]))
         @for person in truth {
@@ -75,7 +78,7 @@ pub fn plan(
             }
         }
         // After the people, so that the thin lines lie on the wide ones.
-        @for (index, ((track, lines), label)) in tracks.iter().zip(&drawn).zip(&labels).enumerate() {
+        @for (index, (track, lines, label)) in drawn.iter().enumerate() {
             @if let Some(label) = label { (track_lines(index, track, lines, label)) }
         }
     };
@@ -112,15 +115,19 @@ impl Label {
     /// as one number; it is on the right and above, and near the right border on the left.
     fn free(end: (f64, f64), id: i64, taken: &mut Vec<Self>) -> Self {
         let width = DIGIT[0] * id.to_string().len() as f64;
-        let sides = if end.0 > PLOT.right - 24.0 { [-7.0 - width, 7.0] } else { [7.0, -7.0 - width] };
-        let places: Vec<Self> = [-5.0, 13.0, -5.0 - DIGIT[1], 13.0 + DIGIT[1]]
-            .iter()
-            .flat_map(|dy| sides.map(|dx| Self { end, left: end.0 + dx, base: end.1 + dy, width }))
-            .collect();
-        let place = places.iter().find(|place| !taken.iter().any(|other| place.is_over(other)));
-        let place = *place.unwrap_or(&places[0]);
-        taken.push(place);
-        place
+        let right = 7.0;
+        let left = -7.0 - width;
+        let sides = if end.0 > PLOT.right - 24.0 { [left, right] } else { [right, left] };
+        for up in ROWS {
+            for side in sides {
+                let place = Self { end, left: end.0 + side, base: end.1 + up, width };
+                if !taken.iter().any(|other| place.is_over(other)) {
+                    taken.push(place);
+                    return place;
+                }
+            }
+        }
+        Self { end, left: end.0 + sides[0], base: end.1 + ROWS[0], width }
     }
 
     fn is_over(&self, other: &Self) -> bool {
