@@ -560,6 +560,12 @@ mod tests {
         assert_eq!(expectation(&[1.0, 1.0, 1.0]), 1.0);
     }
 
+    /// The exponentials of these are no numbers.
+    #[test]
+    fn large_logits_have_a_mean_index() {
+        assert_eq!(expectation(&[900.0, 0.0, 900.0, -900.0]), 1.0);
+    }
+
     #[test]
     fn joints_become_a_person_from_crown_to_sole() {
         let mut joints = [0.5, 0.5, 0.6].repeat(JOINTS);

@@ -103,4 +103,31 @@ mod tests {
         let names = ["yolox-nano", "yolox.onnx", "a/b", "..", "/a", ""].map(is_name);
         assert_eq!(names, [true, false, false, false, false, false]);
     }
+
+    /// Runs itself again with a data folder: the environment is that of a process.
+    #[test]
+    fn a_plain_name_is_that_of_an_installed_network() {
+        const TEST: &str = "installed::tests::a_plain_name_is_that_of_an_installed_network";
+        const IS_INSIDE: &str = "TAGALONG_TEST_OF_INSTALLED_NETWORKS";
+        let folder = tempfile::tempdir().expect("a folder");
+        if std::env::var_os(IS_INSIDE).is_none() {
+            let networks = folder.path().join(NETWORKS);
+            std::fs::create_dir(&networks).expect("a folder within");
+            std::fs::write(networks.join("people.onnx"), "").expect("a file");
+            let program = std::env::current_exe().expect("the path of the tests");
+            let mut again = std::process::Command::new(program);
+            again.args(["--exact", TEST]).env(DATA_FOLDER, folder.path()).env(IS_INSIDE, "");
+            assert!(again.status().expect("the tests run").success());
+            return;
+        }
+        let networks = networks_folder().expect("the folder that is set");
+        assert_eq!(installed_names(), ["people"]);
+        assert_eq!(model_file(folder.path(), "people"), networks.join("people.onnx"));
+        for other in ["others", "people.onnx"] {
+            assert_eq!(model_file(folder.path(), other), folder.path().join(other));
+        }
+        let own = folder.path().join("people");
+        std::fs::write(&own, "").expect("a file");
+        assert_eq!(model_file(folder.path(), "people"), own, "the folder of the config first");
+    }
 }

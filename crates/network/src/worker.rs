@@ -158,18 +158,21 @@ mod tests {
     #[test]
     fn a_network_that_cannot_be_made_is_an_error() {
         /// Returns the error of a network that this cannot load.
-        fn refusal_of(load: fn() -> Result<Sleeper, String>) -> String {
-            let started = Worker::start(load, |_| Ok(()), Duration::from_secs(1));
+        fn refusal_of(load: fn() -> Result<Sleeper, String>, within_s: u64) -> String {
+            let started = Worker::start(load, |_| Ok(()), Duration::from_secs(within_s));
             started.err().expect("it cannot be made")
         }
 
-        assert_eq!(refusal_of(|| Err("no, never".into())), "no, never");
-        let failed = refusal_of(|| panic!("while loading"));
+        assert_eq!(refusal_of(|| Err("no, never".into()), 60), "no, never");
+        let failed = refusal_of(|| panic!("while loading"), 60);
         assert!(failed.contains("the runtime failed"), "{failed}");
-        let slow = refusal_of(|| {
-            thread::sleep(Duration::from_secs(3));
-            Ok(Sleeper)
-        });
+        let slow = refusal_of(
+            || {
+                thread::sleep(Duration::from_secs(3));
+                Ok(Sleeper)
+            },
+            1,
+        );
         assert!(slow.contains("within 1 s"), "{slow}");
     }
 }

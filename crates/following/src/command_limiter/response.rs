@@ -334,6 +334,15 @@ mod tests {
         assert!(first.is_some_and(|frame| (60..75).contains(&frame)), "{first:?}");
     }
 
+    /// For the longest delay after the first command, one from before it may still be executed.
+    #[test]
+    fn what_may_be_of_commands_before_the_first_is_not_compared() {
+        let driven = judged(40, |_| 0.0, |_| 0.5);
+        assert_eq!(driven[..24], [Response::Within(0.0); 24], "1.5 s");
+        let first = driven.iter().position(|response| *response == Response::NotObeyed);
+        assert_eq!(first, Some(32), "after more than half a second");
+    }
+
     #[test]
     fn odometry_that_stands_still_while_the_robot_creeps_is_told() {
         let creeping = judged(150, |_| 0.06, |_| 0.0);

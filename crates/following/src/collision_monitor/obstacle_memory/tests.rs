@@ -4,6 +4,7 @@ use tagalong_geometry::{Distortion, Pinhole};
 
 use super::super::People;
 use super::super::binned::BinnedHazards;
+use super::super::coverage::allowed_part;
 use super::super::depth_state::add_hazards;
 use super::super::footprint::Path;
 use super::super::space::SpaceGrid;
@@ -310,6 +311,24 @@ fn whoever_stepped_before_the_robot_is_there_until_they_are_seen_elsewhere() {
 }
 
 /// A person steps in from the side, nearer than the camera measures.
+#[test]
+fn an_eighth_of_the_image_on_each_side_may_be_dark_from_the_start() {
+    /// Returns the part of the speed that is allowed with so many dark columns on each side.
+    fn allowed_with(dark: usize) -> f64 {
+        let depth = DepthImage::from_fn(80, 60, |u, _| {
+            if (dark..80 - dark).contains(&u) { 3.0 } else { f32::NAN }
+        });
+        let mut surroundings = memory();
+        surroundings.ahead_after(&depth, 0.0, None);
+        let coverage = surroundings.coverage(0.5).expect("an image with depth");
+        allowed_part(&[coverage], &surroundings.footprint, Path::Turn { left: true }, 1.0)
+    }
+
+    assert_eq!([0, 9, 10].map(allowed_with), [1.0; 3]);
+    let with_one_more = allowed_with(11);
+    assert!((with_one_more - (58.0 / 60.0 / 0.5 - 1.0)).abs() < 1e-12, "{with_one_more}");
+}
+
 #[test]
 fn where_the_image_went_dark_from_top_to_bottom_somebody_stands() {
     let seen = with_box(9.0, 0.0);
