@@ -271,13 +271,7 @@ mod tests {
             log_name: "hall".into(),
             log: "logs/hall.mcap".into(),
             truth: "logs/hall.people.csv".into(),
-            whole_bodies: false,
-            drops_doubled_ids: false,
-            seed: 0,
-            inputs: BTreeMap::new(),
-            copy_of: None,
-            version: String::new(),
-            skip: None,
+            ..Task::default()
         }
     }
 }

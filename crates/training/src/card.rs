@@ -23,7 +23,7 @@ pub struct CandidateCounts {
 }
 
 /// Card of a verifier.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Card {
     /// Plugin that reads the model.
     pub plugin: String,
@@ -55,10 +55,7 @@ impl Card {
             seed: args.seed,
             scenes,
             trained_on,
-            rounds: Vec::new(),
-            fit: toml::Table::new(),
-            held_out_rooms: Effect::default(),
-            held_out_logs: None,
+            ..Self::default()
         }
     }
 

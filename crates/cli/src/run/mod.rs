@@ -39,7 +39,7 @@ use tagalong_app::timings::Timings;
 use tagalong_app::unable::unable;
 use tagalong_config::Registry;
 use tagalong_log::write::{FrameNames, FrameRecord, RunDir, RunTexts, TrackLog};
-use tagalong_log::{FrameSource, Input, InputAccount, Inputs, Usage};
+use tagalong_log::{FrameSource, Input, Inputs, Usage};
 use tagalong_pipeline::{FrameReport, MissingSource, Pipeline, ResolvedConfig, StepError};
 use tagalong_render::{Overlay, OverlayData, background};
 use tagalong_simulate::sample;
@@ -204,15 +204,7 @@ fn blank_report(config: &ConfigFile, seed: u64, log: FileFacts) -> RunReport {
         config: FileFacts { name: config.name(), sha256: config.sha256() },
         seed,
         log,
-        data_lost: false,
-        frames: report::Frames::default(),
-        persons: BTreeMap::new(),
-        candidates: report::Candidates::default(),
-        funnel: Vec::new(),
-        counters: BTreeMap::new(),
-        inputs: InputAccount::default(),
-        notes: Vec::new(),
-        nis: None,
+        ..RunReport::default()
     }
 }
 

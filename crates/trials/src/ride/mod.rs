@@ -88,7 +88,7 @@ impl Tick {
 }
 
 /// A scene in which a pipeline drove the robot.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Ride {
     /// Seed of the scene.
     pub seed: u64,
@@ -161,12 +161,8 @@ impl Ride {
         let mut ride = Self {
             seed: scene.seed,
             stand_off_m: pipeline.stand_off_m(),
-            moments: Vec::new(),
-            reports: Vec::new(),
-            took_ms: Vec::new(),
-            ticks: Vec::new(),
-            in_view: Vec::new(),
             faults: draw.simulation().faults().to_vec(),
+            ..Self::default()
         };
         let mut enable = StuckEnable::of(&ride.faults);
         // Time at which the last frame that led to a command was handed over.
