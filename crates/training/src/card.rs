@@ -60,9 +60,6 @@ impl Card {
     }
 
     /// Returns the card as TOML.
-    ///
-    /// # Errors
-    /// As for [`to_toml`].
     pub fn to_text(&self) -> Result<String, Failure> {
         let text = to_toml("the card", self)?;
         Ok(format!(
@@ -131,9 +128,6 @@ impl WindowCard {
     }
 
     /// Returns the card as TOML.
-    ///
-    /// # Errors
-    /// As for [`to_toml`].
     pub fn to_text(&self) -> Result<String, Failure> {
         to_toml("the card", self)
     }

@@ -128,9 +128,6 @@ impl Report {
     }
 
     /// Returns everything as JSON.
-    ///
-    /// # Errors
-    /// As for [`to_json`].
     pub fn json(&self) -> Result<String, Failure> {
         to_json("the report on the rooms", self)
     }

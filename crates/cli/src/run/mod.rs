@@ -59,9 +59,6 @@ pub fn run(args: &RunArgs, registry: &Registry) -> Outcome {
 
 /// Runs a pipeline over a log, for a program with signals of its own: `listen` is called once the
 /// log has been looked through, before anything is written.
-///
-/// # Errors
-/// As for a run by the command.
 pub fn run_until(
     args: &RunArgs,
     registry: &Registry,

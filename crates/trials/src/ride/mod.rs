@@ -129,9 +129,6 @@ impl Ride {
     /// Simulates a ride as [`Ride::new`] of a pipeline that is told where people are, see
     /// [`Contender::told`]: each frame has as its recorded detections the positions of all people within
     /// reach of the laser scanner and in free sight, and the track of the first of them is enrolled.
-    ///
-    /// # Errors
-    /// As [`Ride::new`].
     pub fn told(
         scene: &Scene,
         contender: &Contender,
