@@ -16,6 +16,7 @@ use tagalong_log::{FrameSource, InputSettings, Limits};
 use tagalong_pipeline::Pipeline;
 use tagalong_tests::people::{Boxes, Score, read, score};
 
+#[derive(Default)]
 struct Run {
     /// Boxes of confirmed tracks that were seen in the frame.
     confirmed: Boxes,
@@ -38,12 +39,7 @@ fn run(path: &Path, config: &str) -> Run {
     let mut source =
         FrameSource::open(path, &InputSettings::default(), &Limits::default(), pipeline.inputs())
             .unwrap();
-    let mut run = Run {
-        confirmed: Boxes::new(),
-        detections: BTreeMap::new(),
-        frames: 0,
-        funnel: Funnel::default(),
-    };
+    let mut run = Run::default();
     while let Some(frame) = source.next_frame() {
         let frame = frame.frame;
         let report = pipeline.step(&frame).unwrap();

@@ -28,9 +28,6 @@ pub struct Experiment {
 
 impl Experiment {
     /// Runs the experiment, and adds to each table a note with the seeds of the simulated scenes.
-    ///
-    /// # Errors
-    /// As the experiment.
     pub fn find(&self, lab: &Lab) -> Result<ExperimentFindings, ReproduceError> {
         let mut findings = (self.run)(lab)?;
         let simulated = lab.simulated.take();

@@ -137,9 +137,6 @@ impl Lab<'_> {
 
     /// Returns the draws of a scene as [`Lab::scenes`], of another split: settings are chosen on
     /// `validation`.
-    ///
-    /// # Errors
-    /// As [`Lab::scenes`].
     pub fn scenes_of(
         &self,
         split: Split,
@@ -195,9 +192,6 @@ impl Lab<'_> {
 
     /// Runs all contenders on all scenes and keeps the results of `keep` for each trial, in the
     /// order of the scenes.
-    ///
-    /// # Errors
-    /// As [`each`].
     pub fn trials<T: Send>(
         &self,
         what: &str,
@@ -213,9 +207,6 @@ impl Lab<'_> {
 impl Lab<'_> {
     /// Runs all contenders as [`Lab::trials`], with depth from the scenes' stereo pairs by these
     /// settings, computed once for all contenders.
-    ///
-    /// # Errors
-    /// As [`in_order`].
     pub fn pair_trials<T: Send>(
         &self,
         what: &str,

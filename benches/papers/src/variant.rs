@@ -14,9 +14,6 @@ pub(crate) fn parsed(contender: &Contender) -> Result<Table, ReproduceError> {
 }
 
 /// Returns the contender without a table of its config.
-///
-/// # Errors
-/// As [`parsed`].
 pub(crate) fn without_table(contender: &Contender, key: &str) -> Result<Contender, ReproduceError> {
     let mut config = parsed(contender)?;
     config.remove(key);

@@ -54,9 +54,6 @@ fn rgb(array: &Bound<'_, PyAny>) -> PyResult<RgbImage> {
 }
 
 /// Returns an image of intensities.
-///
-/// # Errors
-/// As for [`add_colour`].
 pub fn grey(array: &Bound<'_, PyAny>, name: &str) -> PyResult<GreyImage> {
     let pixels: PyReadonlyArray2<'_, u8> =
         array.extract().map_err(|_| odd(array, name, "uint8"))?;
@@ -68,9 +65,6 @@ pub fn grey(array: &Bound<'_, PyAny>, name: &str) -> PyResult<GreyImage> {
 
 /// Returns a depth image: float32 or float64 in metres, or uint16 in millimetres. What is not finite,
 /// not above 0, or 65535 is no reading.
-///
-/// # Errors
-/// As for [`add_colour`].
 pub fn depth(array: &Bound<'_, PyAny>) -> PyResult<DepthImage> {
     let shape = shape_of(array, "depth")?;
     if shape.len() != 2 {

@@ -146,9 +146,6 @@ impl ConfigFile {
     }
 
     /// Builds the pipeline as [`ConfigFile::pipeline`] does, for at most so many threads.
-    ///
-    /// # Errors
-    /// As for [`ConfigFile::pipeline`].
     pub fn pipeline_on(
         &self,
         registry: &Registry,
@@ -187,9 +184,6 @@ impl ConfigFile {
     }
 
     /// Returns the tables that are not the pipeline's.
-    ///
-    /// # Errors
-    /// As for [`ConfigFile::pipeline`].
     pub fn outer(&self) -> Result<OuterSettings, Failure> {
         Ok(OuterSettings {
             input: self.table("input")?,
@@ -200,9 +194,6 @@ impl ConfigFile {
 
     /// Returns the tables that are not the pipeline's, with the sources of obstacles that its collision
     /// monitor asks for as part of the input.
-    ///
-    /// # Errors
-    /// As for [`ConfigFile::pipeline`].
     pub fn outer_for(&self, pipeline: &Pipeline) -> Result<OuterSettings, Failure> {
         let LogSettings { input, limits, .. } = LogSettings::of(pipeline)?;
         Ok(OuterSettings { input, limits, output: pipeline.config().table("output")? })
@@ -210,9 +201,6 @@ impl ConfigFile {
 
     /// Returns a note for each list that replaces an inherited one whole: a reader who meant to change one
     /// setting loses all others.
-    ///
-    /// # Errors
-    /// As for [`ConfigFile::pipeline`].
     pub fn notes(&self) -> Result<Vec<String>, Failure> {
         let replaced = self.source.document().and_then(|document| document.replaced_lists());
         let mut notes = Vec::new();

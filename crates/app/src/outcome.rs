@@ -137,9 +137,6 @@ pub fn write_file(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Failure>
 }
 
 /// Makes the parent folder of a file.
-///
-/// # Errors
-/// As for [`make_folder`].
 pub fn make_room_for(file: &Path) -> Result<(), Failure> {
     file.parent().filter(|folder| !folder.as_os_str().is_empty()).map_or(Ok(()), make_folder)
 }

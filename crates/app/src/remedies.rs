@@ -171,9 +171,6 @@ impl Remedies {
     }
 
     /// Returns the remedies as TOML.
-    ///
-    /// # Errors
-    /// As for [`to_toml`].
     pub fn toml(&self) -> Result<String, Failure> {
         to_toml("the remedies", &File { drop: self.drop.clone() })
     }

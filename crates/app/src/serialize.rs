@@ -17,9 +17,6 @@ pub fn to_json<T: Serialize + ?Sized>(name: &str, value: &T) -> Result<String, F
 }
 
 /// Returns a value as JSON in one line, with a line end.
-///
-/// # Errors
-/// As for [`to_json`].
 pub fn to_json_line<T: Serialize + ?Sized>(name: &str, value: &T) -> Result<String, Failure> {
     let text = serde_json::to_string(value).map_err(|why| failed(name, "JSON", why))?;
     Ok(text + "\n")

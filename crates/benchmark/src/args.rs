@@ -69,7 +69,7 @@ pub enum Step {
 }
 
 /// Compared pipelines and logs.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Debug, Default)]
 pub struct PlanArgs {
     /// The pipelines [default: every config in configs that suits a log, or every built-in one].
     #[arg(long, num_args = 1.., value_name = "CONFIG")]

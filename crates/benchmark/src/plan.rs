@@ -26,7 +26,7 @@ use super::made_with;
 const FILE: &str = "file ";
 
 /// One pipeline on one log with one seed.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Task {
     /// Its number in the plan, from 1.
     pub k: usize,
@@ -481,14 +481,7 @@ pub fn planned_for_tests(pipeline: &str) -> Task {
         log_name: "hall".into(),
         log: "logs/hall.mcap".into(),
         truth: "logs/hall.people.csv".into(),
-        whole_bodies: false,
-        drops_doubled_ids: false,
-        seed: 0,
-        inputs: BTreeMap::new(),
-        copy_of: None,
-        made_with_log: false,
-        version: String::new(),
-        skip: None,
+        ..Task::default()
     }
 }
 
@@ -507,13 +500,7 @@ mod tests {
 
     #[test]
     fn the_size_of_a_plan_names_the_option_that_limits_it() {
-        let mut args = PlanArgs {
-            configs: Vec::new(),
-            logs: Vec::new(),
-            logs_dir: None,
-            seeds: 1,
-            drop_doubled_ids: false,
-        };
+        let mut args = PlanArgs { seeds: 1, ..PlanArgs::default() };
         let all = size(&args, 38, 8, 304);
         assert_eq!(all, "304 tasks planned: 38 configs on 8 logs; --configs limits them");
         (args.configs, args.seeds) = (vec!["a.toml".into()], 3);

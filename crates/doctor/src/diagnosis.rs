@@ -17,7 +17,7 @@ use super::visit::Visit;
 use super::{alternatives, checks, present, sheets};
 
 /// Complete result of the doctor.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub struct Diagnosis {
     /// The config, or its name.
     #[serde(serialize_with = "path_text::serialize")]
@@ -131,16 +131,12 @@ impl Diagnosis {
             config,
             log: args.log.clone(),
             frames: evidence.trial.frames,
-            pipelines: Vec::new(),
-            contents: String::new(),
-            better: None,
-            network: None,
             inputs: evidence.inspection.inputs.clone(),
             findings: findings.collect(),
             coverage: evidence.coverage.clone(),
             alternatives: evidence.alternatives.clone(),
-            pictures: None,
             funnel: funnel(visit, resolved, folder, remedies)?,
+            ..Self::default()
         })
     }
 }

@@ -156,7 +156,7 @@ fn hash_of(data: &[u8]) -> u64 {
 }
 
 /// Queue that orders a stream of images by stamp.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Reorder {
     window: usize,
     queue: VecDeque<Payload>,
@@ -169,14 +169,7 @@ pub(crate) struct Reorder {
 
 impl Reorder {
     pub(crate) fn new(window: usize) -> Self {
-        Self {
-            window,
-            queue: VecDeque::new(),
-            ready: VecDeque::new(),
-            suspect: None,
-            last: None,
-            last_hash: 0,
-        }
+        Self { window, ..Self::default() }
     }
 
     pub(crate) fn push(&mut self, payload: Payload) -> Arrival {

@@ -34,7 +34,7 @@ use crate::{Limits, LogError};
 const MAX_STAMPS: usize = 20_000;
 
 /// Message type of a topic, as far as Tagalong uses it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Type {
     Image,
     CompressedImage,
@@ -49,6 +49,7 @@ pub(crate) enum Type {
     Sensor,
     /// A number, which may be the unit of a depth camera.
     Number,
+    #[default]
     Other,
 }
 
@@ -74,7 +75,7 @@ impl Type {
 }
 
 /// One topic of a log.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Topic {
     pub(crate) kind: Type,
     pub(crate) schema: String,
@@ -115,7 +116,7 @@ pub(crate) struct Topic {
 }
 
 /// Contents of a log.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Scan {
     pub(crate) path: PathBuf,
     pub(crate) bytes: u64,
@@ -314,18 +315,12 @@ impl Gathering {
     pub(crate) fn scan(&self, name: &str) -> Scan {
         Scan {
             path: name.into(),
-            bytes: 0,
-            sha256: String::new(),
-            parts: Vec::new(),
             topics: self.topics.clone(),
             infos: self.infos.clone(),
             depth_units: self.depth_units.clone(),
             tf: self.tf.clone(),
             link_times: self.link_times.clone(),
-            counters: Counters::new(),
-            notes: Vec::new(),
-            data_lost: false,
-            has_recording_times: false,
+            ..Scan::default()
         }
     }
 
@@ -340,27 +335,8 @@ impl Gathering {
             kind: if matches!(encoding, "cdr" | "ros1") { Type::of(schema) } else { Type::Other },
             schema: schema.to_owned(),
             encoding: encoding.to_owned(),
-            count: 0,
-            undecodable: 0,
-            faulty: 0,
-            fault: None,
             first_log_time: u64::MAX,
-            last_log_time: 0,
-            pixels: None,
-            content: Content::Unknown,
-            is_deep_grey: false,
-            is_other_stream: false,
-            is_jpeg_depth: false,
-            size: None,
-            cloud: None,
-            cloud_fault: None,
-            video_fault: None,
-            has_points: false,
-            frame_id: None,
-            child_frame_id: None,
-            part: None,
-            stamps: Vec::new(),
-            recorded: Vec::new(),
+            ..Topic::default()
         })
     }
 

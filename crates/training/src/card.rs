@@ -23,7 +23,7 @@ pub struct CandidateCounts {
 }
 
 /// Card of a verifier.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Card {
     /// Plugin that reads the model.
     pub plugin: String,
@@ -55,17 +55,11 @@ impl Card {
             seed: args.seed,
             scenes,
             trained_on,
-            rounds: Vec::new(),
-            fit: toml::Table::new(),
-            held_out_rooms: Effect::default(),
-            held_out_logs: None,
+            ..Self::default()
         }
     }
 
     /// Returns the card as TOML.
-    ///
-    /// # Errors
-    /// As for [`to_toml`].
     pub fn to_text(&self) -> Result<String, Failure> {
         let text = to_toml("the card", self)?;
         Ok(format!(
@@ -134,9 +128,6 @@ impl WindowCard {
     }
 
     /// Returns the card as TOML.
-    ///
-    /// # Errors
-    /// As for [`to_toml`].
     pub fn to_text(&self) -> Result<String, Failure> {
         to_toml("the card", self)
     }

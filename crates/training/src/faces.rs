@@ -45,9 +45,6 @@ pub fn visit(data: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> 
 }
 
 /// Passes the pictures of FDDB, with the positions of the faces from its table.
-///
-/// # Errors
-/// As for [`visit`].
 pub fn fddb(data: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
     let table = data.join("faces/fddb.csv");
     let folder = data.join("faces/fddb");

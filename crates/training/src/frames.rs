@@ -67,9 +67,6 @@ pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome
 }
 
 /// Passes the frames of so many simulated rooms to a trainer.
-///
-/// # Errors
-/// Those of the trainer.
 pub(super) fn show_scenes(
     session: &Session<'_>,
     scenes: u64,

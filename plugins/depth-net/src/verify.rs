@@ -13,9 +13,6 @@ pub struct DepthNetVerifier {
 
 impl DepthNetVerifier {
     /// Creates a verifier and reads its model.
-    ///
-    /// # Errors
-    /// As [`crate::DepthNet::new`].
     pub fn new(config: VerifierConfig, context: &Context) -> Result<Self> {
         check_settings(&config)?;
         let calibration = ScoreCalibration::new(config.weight, config.limit, config.bias)?;

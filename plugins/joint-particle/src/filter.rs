@@ -18,6 +18,7 @@ use crate::resampling::{effective_size, kld_size};
 use crate::weighing::{WeighingInput, facing, sketch, support, weigh};
 
 /// Particle filter of people, single or in groups.
+#[derive(Default)]
 pub struct JointParticle {
     config: Config,
     seed: u64,
@@ -40,17 +41,7 @@ impl JointParticle {
     /// [`tagalong_core::Error::Settings`] for settings outside their ranges.
     pub fn new(config: Config, seed: u64) -> Result<Self> {
         config.check()?;
-        Ok(Self {
-            config,
-            seed,
-            groups: Vec::new(),
-            overlaps: Overlaps::default(),
-            headings: BTreeMap::new(),
-            wardrobe: Wardrobe::default(),
-            unfound_s: BTreeMap::new(),
-            ahead_s: 0.0,
-            dt_s: 0.0,
-        })
+        Ok(Self { config, seed, ..Self::default() })
     }
 
     /// Resamples groups in which few particles have most of the weight.

@@ -57,9 +57,6 @@ impl Onnx {
     }
 
     /// Creates a detector whose network another runtime runs.
-    ///
-    /// # Errors
-    /// Those of [`Self::new`].
     pub fn with_runtime(runtime: Runtime, config: Config, context: &Context) -> Result<Self> {
         config.check()?;
         let mark = format!("{:?} {config:?}", context.base_dir).into();

@@ -45,9 +45,6 @@ fn forget_the_seam(blob: &mut Blob, columns: &[u16]) {
 }
 
 /// Builds the detector.
-///
-/// # Errors
-/// As [`OmniAppearance::new`].
 pub fn detector(config: Config, context: &Context) -> Result<OmniAppearance> {
     OmniAppearance::new(config.printed(), context)
 }

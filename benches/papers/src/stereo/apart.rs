@@ -39,9 +39,6 @@ const TURNS: [(&str, &str); 6] = [
 type Found = Vec<[u64; 2]>;
 
 /// Measures the share of images in which both of two people are found, by gap and range.
-///
-/// # Errors
-/// As [`Lab::trials`].
 pub fn apart(lab: &Lab) -> Result<Findings, ReproduceError> {
     let contenders = lab.contenders(&PIPELINES)?;
     let seeds = lab.seeds(8);

@@ -34,9 +34,6 @@ struct Judged {
 
 /// Trains both forms with both numbers of samples, and counts what they reject in rooms of the test
 /// split.
-///
-/// # Errors
-/// As [`Lab::trials`].
 pub fn few_samples(lab: &Lab) -> Result<Findings, ReproduceError> {
     let detects = without_verifiers(&lab.contender(DETECTS)?)?;
     let seeds = lab.seeds(40);

@@ -94,9 +94,6 @@ struct Walk {
 }
 
 /// Fits P1's filter, and the same with its velocity corrected, in stereo and in depth images.
-///
-/// # Errors
-/// As [`Lab::trials`].
 pub fn of_p1(lab: &Lab) -> Result<Findings, ReproduceError> {
     const DEPTH: &str = "depth-ekf-as-printed";
     let mut findings = of_walks(lab, &FOLLOWED, &variants::OF_P1, &[])?;
@@ -107,9 +104,6 @@ pub fn of_p1(lab: &Lab) -> Result<Findings, ReproduceError> {
 }
 
 /// Fits P4's threshold and filter, and the same with its velocity corrected.
-///
-/// # Errors
-/// As [`Lab::trials`].
 pub fn of_p4(lab: &Lab) -> Result<Findings, ReproduceError> {
     of_walks(lab, &FOLLOWED, &variants::OF_P4, &[threshold()])
 }

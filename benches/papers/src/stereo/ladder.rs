@@ -24,9 +24,6 @@ struct Score {
 }
 
 /// Compares the three pipelines, with the gain of each step.
-///
-/// # Errors
-/// As [`Lab::trials`].
 pub fn ladder(lab: &Lab) -> Result<Findings, ReproduceError> {
     let contenders = lab.contenders(&PIPELINES)?;
     let mut draws = Vec::new();

@@ -73,9 +73,6 @@ struct Judged {
 }
 
 /// Runs the experiment.
-///
-/// # Errors
-/// As [`Lab::trials`].
 pub fn left_out(lab: &Lab) -> Result<Findings, ReproduceError> {
     let detects = without_verifiers(&lab.contender(DETECTS)?)?;
     let mut trainers = Vec::new();

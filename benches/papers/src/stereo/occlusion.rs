@@ -20,9 +20,6 @@ struct Case {
 }
 
 /// Counts kept identities by gap and duration.
-///
-/// # Errors
-/// As [`Lab::trials`].
 pub fn occlusion(lab: &Lab) -> Result<Findings, ReproduceError> {
     let scenes = lab.scenes("full-occlusion", &[STEREO], lab.seeds(100))?;
     let contenders = lab.contenders(&PIPELINES)?;

@@ -44,9 +44,6 @@ pub fn of_p4(lab: &Lab) -> Result<Findings, ReproduceError> {
 }
 
 /// Measures the time of P1.
-///
-/// # Errors
-/// As [`of_p4`].
 pub fn of_p1(lab: &Lab) -> Result<Findings, ReproduceError> {
     times(lab, &["stereo-ekf"], &[None; 4], P1_MS, "P1, section 4")
 }
@@ -87,9 +84,6 @@ fn times(
 }
 
 /// Measures what the boundary points save.
-///
-/// # Errors
-/// As [`of_p4`].
 pub fn boundary_points(lab: &Lab) -> Result<Findings, ReproduceError> {
     let printed = lab.contender("stereo-svm-ekf-as-printed")?;
     let none_need_pass = [("detectors.0.config.boundary_min_passed", Value::from(0))];

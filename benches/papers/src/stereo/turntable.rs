@@ -42,9 +42,6 @@ struct TurntableImage {
 }
 
 /// Measures the share of directions in which the person is found.
-///
-/// # Errors
-/// As [`Lab::trials`].
 pub fn directions(lab: &Lab) -> Result<Findings, ReproduceError> {
     let subsets: Vec<Contender> =
         SUBSETS.iter().map(|subset| detector(lab, subset)).collect::<Result<_, _>>()?;
@@ -68,9 +65,6 @@ pub fn directions(lab: &Lab) -> Result<Findings, ReproduceError> {
 
 /// Measures the share of directions in which the printed comparison finds the person, by the
 /// percentile of the depth image that is its background.
-///
-/// # Errors
-/// As [`Lab::trials`].
 pub fn background(lab: &Lab) -> Result<Findings, ReproduceError> {
     let printed = lab.contender("stereo-svm-ekf-as-printed")?;
     let percentiles: Vec<Contender> = PERCENTILES
@@ -109,9 +103,6 @@ fn conditions(turns: &[Vec<TurntableImage>], rows: &[Row]) -> String {
 }
 
 /// Measures bias and spread of the depth of the head.
-///
-/// # Errors
-/// As [`Lab::trials`].
 pub fn depth(lab: &Lab) -> Result<Findings, ReproduceError> {
     fn about_1(distance: f64) -> Cell {
         Cell::number(if distance == 3.0 { 1.0 } else { f64::NAN }, 0)

@@ -114,17 +114,11 @@ pub fn stereo_settings(contender: &Contender) -> Result<StereoSettings, Reproduc
 }
 
 /// Returns the contender with numbers replaced.
-///
-/// # Errors
-/// As [`Variant::contender`].
 pub fn with(contender: &Contender, set: &[(&str, f64)]) -> Result<Contender, ReproduceError> {
     replaced(contender, set.iter().map(|(key, number)| (*key, Value::from(*number))))
 }
 
 /// Returns the contender with values replaced.
-///
-/// # Errors
-/// As [`Variant::contender`].
 pub fn replaced<'a>(
     contender: &Contender,
     set: impl Iterator<Item = (&'a str, Value)>,

@@ -84,9 +84,6 @@ struct Tally {
 }
 
 /// Compares detections and tracks without a verifier and with one.
-///
-/// # Errors
-/// As [`Lab::trials`].
 pub fn verifier(lab: &Lab) -> Result<Findings, ReproduceError> {
     let contenders = lab.contenders(&PIPELINES)?;
     let (mut sightings, mut tracks) = real_rooms(lab)?;

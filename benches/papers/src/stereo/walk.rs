@@ -54,17 +54,11 @@ pub const FOLLOWED: [(&str, &str); 3] =
     [STEREO, ("robot.behind_m", "2.0"), ("robot.speed_mps", "0.7")];
 
 /// Measures the error of the walker's position, by the forms of P1's filter.
-///
-/// # Errors
-/// As [`Lab::trials`].
 pub fn of_p1(lab: &Lab) -> Result<Findings, ReproduceError> {
     walk(lab, &OF_P1)
 }
 
 /// Measures the error of the walker's position, by the forms of P4.
-///
-/// # Errors
-/// As [`Lab::trials`].
 pub fn of_p4(lab: &Lab) -> Result<Findings, ReproduceError> {
     walk(lab, &OF_P4)
 }
@@ -74,9 +68,6 @@ pub fn of_p4(lab: &Lab) -> Result<Findings, ReproduceError> {
 const WHEEL_ERRORS: [&str; 4] = ["0", "0.001", "0.002", "0.005"];
 
 /// Measures the error of the walker's position by how wrong the wheels are.
-///
-/// # Errors
-/// As [`Lab::trials`].
 pub fn by_wheels(lab: &Lab) -> Result<Findings, ReproduceError> {
     let contenders = lab.contenders(&["stereo-svm-ekf", "stereo-verified"])?;
     let columns: Vec<Vec<Walk>> = WHEEL_ERRORS

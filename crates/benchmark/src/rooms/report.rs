@@ -38,7 +38,7 @@ struct About {
 }
 
 /// Results of a pipeline.
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 pub struct Fitted {
     pub name: String,
     /// Number of settings among which the rooms chose.
@@ -128,9 +128,6 @@ impl Report {
     }
 
     /// Returns everything as JSON.
-    ///
-    /// # Errors
-    /// As for [`to_json`].
     pub fn json(&self) -> Result<String, Failure> {
         to_json("the report on the rooms", self)
     }
@@ -484,16 +481,7 @@ pub(super) mod testing {
 
     /// Returns the results of a pipeline in these rooms.
     pub fn fitted(name: &str, rooms: Vec<InRoom>) -> Fitted {
-        Fitted {
-            name: name.into(),
-            settings: 1,
-            refused: 0,
-            skipped: Vec::new(),
-            shipped: Values::new(),
-            chosen_with_all: Values::new(),
-            rooms,
-            too_few: None,
-        }
+        Fitted { name: name.into(), settings: 1, rooms, ..Fitted::default() }
     }
 }
 

@@ -22,7 +22,7 @@ fn config_help() -> String {
 }
 
 /// Arguments of `tagalong run`.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Debug, Default)]
 pub struct RunArgs {
     /// The pipeline: a TOML file or the name of a built-in one.
     // The help has the names of the list of pipelines.
@@ -119,24 +119,7 @@ impl RunArgs {
     /// Arguments of a run that prints nothing and replaces the files of an earlier one, for commands
     /// that consist of runs; without a config it is the one for the sensors in the log.
     pub fn quiet(config: Option<PathBuf>, output: PathBuf) -> Self {
-        Self {
-            config,
-            log: None,
-            output: Some(output),
-            overlay: None,
-            with_images: false,
-            smoothed: false,
-            overwrite: true,
-            strict: false,
-            threads: None,
-            seed: None,
-            serve: None,
-            realtime: false,
-            format: Format::default(),
-            each_camera: false,
-            input: InputArgs::default(),
-            quiet: true,
-        }
+        Self { config, output: Some(output), overwrite: true, quiet: true, ..Self::default() }
     }
 
     /// Returns the path of the log.

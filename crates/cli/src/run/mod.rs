@@ -39,7 +39,7 @@ use tagalong_app::timings::Timings;
 use tagalong_app::unable::unable;
 use tagalong_config::Registry;
 use tagalong_log::write::{FrameNames, FrameRecord, RunDir, RunTexts, TrackLog};
-use tagalong_log::{FrameSource, Input, InputAccount, Inputs, Usage};
+use tagalong_log::{FrameSource, Input, Inputs, Usage};
 use tagalong_pipeline::{FrameReport, MissingSource, Pipeline, ResolvedConfig, StepError};
 use tagalong_render::{Overlay, OverlayData, background};
 use tagalong_simulate::sample;
@@ -59,9 +59,6 @@ pub fn run(args: &RunArgs, registry: &Registry) -> Outcome {
 
 /// Runs a pipeline over a log, for a program with signals of its own: `listen` is called once the
 /// log has been looked through, before anything is written.
-///
-/// # Errors
-/// As for a run by the command.
 pub fn run_until(
     args: &RunArgs,
     registry: &Registry,
@@ -204,15 +201,7 @@ fn blank_report(config: &ConfigFile, seed: u64, log: FileFacts) -> RunReport {
         config: FileFacts { name: config.name(), sha256: config.sha256() },
         seed,
         log,
-        data_lost: false,
-        frames: report::Frames::default(),
-        persons: BTreeMap::new(),
-        candidates: report::Candidates::default(),
-        funnel: Vec::new(),
-        counters: BTreeMap::new(),
-        inputs: InputAccount::default(),
-        notes: Vec::new(),
-        nis: None,
+        ..RunReport::default()
     }
 }
 

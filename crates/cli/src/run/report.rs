@@ -7,7 +7,7 @@ use tagalong_pipeline::{Fate, FrameReport, Outcome};
 
 /// `report.json`: results of a run, and its dropped candidates with the reasons. Two runs of the
 /// same log, config and seed give the same bytes.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct RunReport {
     /// Version of Tagalong.
     pub tagalong: &'static str,
@@ -40,7 +40,7 @@ pub struct RunReport {
 }
 
 /// File, without its folder: the report does not depend on its place.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct FileFacts {
     /// Name of the file.
     pub name: String,

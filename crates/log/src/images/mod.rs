@@ -147,7 +147,7 @@ impl ImageError {
 }
 
 /// Content of an encoding or format, as far as its name shows it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Content {
     /// Colour or intensity.
@@ -155,6 +155,7 @@ pub enum Content {
     /// Depth.
     Depth,
     /// Unknown.
+    #[default]
     Unknown,
 }
 

@@ -52,6 +52,7 @@ const PEOPLE: [&str; 12] = [
 const NAMED_CLASSES: usize = 12;
 
 /// Messages that wait for their frame.
+#[derive(Default)]
 struct Recorded {
     in_space: bool,
     /// Classes that are people; empty: [`PEOPLE`].
@@ -72,13 +73,7 @@ impl Recorded {
         Self {
             in_space: is_type(schema, SPACE),
             classes: input.detection_classes.clone(),
-            layouts: Vec::new(),
-            cameras: CameraFrames::default(),
-            waiting: Waiting::default(),
-            paired: None,
-            boxes: BoxLayout::default(),
-            read: 0,
-            used: 0,
+            ..Self::default()
         }
     }
 }

@@ -34,6 +34,7 @@ use crate::tally::Tally;
 use crate::topics::Problem;
 
 /// State that is carried from frame to frame.
+#[derive(Default)]
 pub(super) struct Assembler {
     index: u64,
     camera: Option<Arc<Camera>>,
@@ -47,18 +48,6 @@ pub(super) struct Assembler {
 }
 
 impl Assembler {
-    pub(super) fn new() -> Self {
-        Self {
-            index: 0,
-            camera: None,
-            is_hold_told: false,
-            aligner: DepthAligner::default(),
-            unwrapping: Unwrapping::default(),
-            previous: None,
-            misfit: None,
-        }
-    }
-
     /// Returns the number of messages that were to make a frame.
     pub(super) fn count(&self) -> u64 {
         self.index

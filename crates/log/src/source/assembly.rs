@@ -37,7 +37,7 @@ impl Assembly {
     pub(super) fn new(plan: Plan, tally: Tally) -> Self {
         Self {
             intake: Intake::new(&plan),
-            assembler: Assembler::new(),
+            assembler: Assembler::default(),
             plan,
             tally,
             ended: false,

@@ -20,7 +20,7 @@ const SATURATED_M: f32 = 65.535;
 const NEAREST_NOISY_M: f32 = 0.001;
 
 /// Injected faults of a scene, with the data that they repeat.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Injector {
     faults: Vec<ScheduledFault>,
     seed: u64,
@@ -50,17 +50,7 @@ struct Odometer {
 
 impl Injector {
     pub(super) fn new(faults: Vec<ScheduledFault>, seed: u64) -> Self {
-        Self {
-            faults,
-            seed,
-            held: Images::default(),
-            held_scan: None,
-            held_readings: BTreeMap::new(),
-            last: None,
-            reading: None,
-            whole: None,
-            odometer: None,
-        }
+        Self { faults, seed, ..Self::default() }
     }
 
     /// Returns the faults.

@@ -341,16 +341,12 @@ mod tests {
         });
         Ride {
             seed: 1,
-            stand_off_m: None,
-            moments: Vec::new(),
-            reports: Vec::new(),
-            took_ms: Vec::new(),
-            faults: Vec::new(),
             ticks: ticks.collect(),
             in_view: vec![
                 (2.9, ApproachInView { camera: true, laser: false }),
                 (3.2, ApproachInView { camera: false, laser: true }),
             ],
+            ..Ride::default()
         }
     }
 

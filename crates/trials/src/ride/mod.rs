@@ -88,7 +88,7 @@ impl Tick {
 }
 
 /// A scene in which a pipeline drove the robot.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Ride {
     /// Seed of the scene.
     pub seed: u64,
@@ -129,9 +129,6 @@ impl Ride {
     /// Simulates a ride as [`Ride::new`] of a pipeline that is told where people are, see
     /// [`Contender::told`]: each frame has as its recorded detections the positions of all people within
     /// reach of the laser scanner and in free sight, and the track of the first of them is enrolled.
-    ///
-    /// # Errors
-    /// As [`Ride::new`].
     pub fn told(
         scene: &Scene,
         contender: &Contender,
@@ -161,12 +158,8 @@ impl Ride {
         let mut ride = Self {
             seed: scene.seed,
             stand_off_m: pipeline.stand_off_m(),
-            moments: Vec::new(),
-            reports: Vec::new(),
-            took_ms: Vec::new(),
-            ticks: Vec::new(),
-            in_view: Vec::new(),
             faults: draw.simulation().faults().to_vec(),
+            ..Self::default()
         };
         let mut enable = StuckEnable::of(&ride.faults);
         // Time at which the last frame that led to a command was handed over.

@@ -67,6 +67,7 @@ struct Picture {
 }
 
 /// Trainer that collects windows and pictures, and fits models to them.
+#[derive(Default)]
 pub struct HogTrainer {
     layout: Layout,
     training: Training,
@@ -98,17 +99,7 @@ impl HogTrainer {
         {
             return Err(Error::Other("penalties, `epochs` and `trees` must be positive".into()));
         }
-        Ok(Self {
-            layout,
-            training,
-            seed,
-            windows: Windows::default(),
-            people: Vec::new(),
-            pictures: Vec::new(),
-            depth: DepthWindows::default(),
-            rooms: Vec::new(),
-            cut_off: 0,
-        })
+        Ok(Self { layout, training, seed, ..Self::default() })
     }
 
     fn add_person(&mut self, grey: &GreyImage, square: &Rect, use_: Use) {

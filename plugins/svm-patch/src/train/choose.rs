@@ -31,9 +31,6 @@ impl Trial {
 }
 
 /// Tries every width with every penalty; samples of one group are always in the same part.
-///
-/// # Errors
-/// As [`solver::fit`].
 pub fn trials(
     samples: &[&Sample],
     sampler: Sampler,

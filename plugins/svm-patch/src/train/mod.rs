@@ -48,9 +48,6 @@ impl PatchTrainer {
     }
 
     /// Tries the whole grid of widths and penalties.
-    ///
-    /// # Errors
-    /// As [`Trainer::fit`].
     pub fn trials(&self, progress: &mut dyn FnMut(f64)) -> Result<Vec<Trial>> {
         let tried = choose::subset(&self.samples, self.training.max_tried, self.seed);
         choose::trials(&tried, self.sampler, &self.training, self.seed, progress)

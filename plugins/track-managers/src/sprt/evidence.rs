@@ -15,7 +15,7 @@ const MOVED_PLACES: usize = 3;
 const MOVED_SIGHTINGS: u32 = 2;
 
 /// The evidence gathered for one track.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Evidence {
     pub(crate) confirmed: bool,
     pub(crate) moved: bool,
@@ -43,20 +43,7 @@ impl Evidence {
     pub(crate) fn new(look: f64, at: Point2<f64>, clutter: f64, config: &Config) -> Self {
         let mut looks = Looks::default();
         looks.add(at, look, config);
-        let mut new = Self {
-            confirmed: false,
-            moved: false,
-            looks,
-            clutter,
-            start: at,
-            away: 0,
-            age_s: 0.0,
-            still_s: 0.0,
-            doubted_s: 0.0,
-            unverified_s: 0.0,
-            missed_s: 0.0,
-            misses: 0,
-        };
+        let mut new = Self { looks, clutter, start: at, ..Self::default() };
         new.confirmed = new.log_odds(config) >= config.confirm_log_odds;
         new
     }

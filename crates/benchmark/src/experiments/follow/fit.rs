@@ -91,9 +91,6 @@ fn rounded(value: f64) -> f64 {
 }
 
 /// Returns the settings as lines for a config.
-///
-/// # Errors
-/// As for [`to_toml`].
 pub fn toml(looks: &LooksSettings, calibration: &[[f64; 2]]) -> Result<String, Failure> {
     let body = to_toml("the settings [target.looks]", looks)?;
     Ok(format!(

@@ -173,10 +173,6 @@ mod tests {
         let clearance = Clearance { people_m: 1.0, things_m: 1.0 };
         let ride = Ride {
             seed: 1,
-            stand_off_m: None,
-            moments: Vec::new(),
-            reports: Vec::new(),
-            took_ms: Vec::new(),
             ticks: vec![Tick {
                 at_s: 9.98,
                 speed_mps: 0.0,
@@ -187,8 +183,8 @@ mod tests {
                 reason: None,
                 effect: "stands",
             }],
-            in_view: Vec::new(),
             faults: scene.scheduled_faults(),
+            ..Ride::default()
         };
         assert_eq!(
             story(&ride),

@@ -17,9 +17,6 @@ pub struct Result {
 }
 
 /// Returns one result for each contender, for each random variant.
-///
-/// # Errors
-/// As for [`Trial::new`].
 pub fn run(
     scenes: &[Scene],
     contenders: &[Contender],
