@@ -19,8 +19,6 @@ enum Edit {
     /// Replaces the part from one text to another, both included: the page shows the changed parts
     /// only, and the template has the rest.
     Replace { file: &'static str, from: &'static str, to: &'static str },
-    /// Replaces a default by the code in the sentence that begins so; takes no block.
-    Default { file: &'static str, from: &'static str, sentence: &'static str },
     /// Adds the block at the end.
     Append { file: &'static str },
 }
@@ -37,10 +35,9 @@ pub const GUIDES: [Guide; 4] = [
         edits: &[
             Edit::Replace {
                 file: "config.rs",
-                from: "    /// Added to all log-odds",
-                to: "pub bias: f64,\n",
+                from: "        /// Added to all log-odds",
+                to: "pub bias: f64 = 0.0,\n",
             },
-            Edit::Default { file: "config.rs", from: "bias: 0.0", sentence: "in `Default` by `" },
             Edit::Replace { file: "verify.rs", from: "    fn log_odds(", to: END_OF_FN },
         ],
     },
@@ -51,10 +48,9 @@ pub const GUIDES: [Guide; 4] = [
         edits: &[
             Edit::Replace {
                 file: "config.rs",
-                from: "    /// How fast the height of a head wanders",
-                to: "pub height_wander: f64,\n}\n",
+                from: "        /// How fast the height of a head wanders",
+                to: "pub height_wander: f64 = 0.07,\n",
             },
-            Edit::Replace { file: "config.rs", from: "impl Default for Config {", to: "\n}\n" },
             Edit::Replace { file: "filter.rs", from: "    fn correct(", to: END_OF_FN },
             Edit::Append { file: "filter.rs" },
         ],
@@ -66,10 +62,9 @@ pub const GUIDES: [Guide; 4] = [
         edits: &[
             Edit::Replace {
                 file: "config.rs",
-                from: "    /// Candidates with a lower score",
-                to: "}\n",
+                from: "        /// Candidates with a lower score",
+                to: "pub min_score: f64 = 0.0,\n",
             },
-            Edit::Replace { file: "config.rs", from: "impl Default for Config {", to: "\n}\n" },
             Edit::Replace { file: "detect.rs", from: "use tagalong_core::{", to: "LOW_SCORE};\n" },
             Edit::Replace { file: "detect.rs", from: "    config: Config,\n", to: END_OF_FN },
             Edit::Replace {
@@ -91,8 +86,7 @@ pub const GUIDES: [Guide; 4] = [
         kind: Kind::Associator,
         name: "seniority",
         edits: &[
-            Edit::Replace { file: "config.rs", from: "    pub gate_m: f64,\n", to: "}\n" },
-            Edit::Replace { file: "config.rs", from: "impl Default for Config {", to: "\n}\n" },
+            Edit::Replace { file: "config.rs", from: "        pub gate_m: f64", to: " = 0.7,\n" },
             Edit::Replace { file: "associate.rs", from: "    fn associate(", to: END_OF_FN },
             Edit::Append { file: "associate.rs" },
         ],
@@ -109,7 +103,7 @@ impl Guide {
             let file = edit.file();
             let path = format!("plugins/{}/src/{file}", self.name);
             let source = workspace.read(&path)?;
-            let changed = edit.apply(&source, &text, &mut blocks).with_context(|| {
+            let changed = edit.apply(&source, &mut blocks).with_context(|| {
                 format!("{path} is not as {} expects: page or template has changed", self.page)
             })?;
             workspace.write(&path, &changed)?;
@@ -121,23 +115,14 @@ impl Guide {
 impl Edit {
     fn file(&self) -> &'static str {
         match self {
-            Self::Replace { file, .. } | Self::Default { file, .. } | Self::Append { file } => file,
+            Self::Replace { file, .. } | Self::Append { file } => file,
         }
     }
 
     /// Returns the changed source; none if page and source do not fit together.
-    fn apply(
-        &self,
-        source: &str,
-        page: &str,
-        blocks: &mut impl Iterator<Item = String>,
-    ) -> Option<String> {
+    fn apply(&self, source: &str, blocks: &mut impl Iterator<Item = String>) -> Option<String> {
         match self {
             Self::Replace { from, to, .. } => replace_between(source, from, to, &blocks.next()?),
-            Self::Default { from, sentence, .. } => {
-                let code = page.split_once(sentence)?.1.split('`').next()?;
-                source.contains(from).then(|| source.replace(from, code))
-            }
             Self::Append { .. } => Some(format!("{source}\n{}", blocks.next()?)),
         }
     }
@@ -175,11 +160,10 @@ mod tests {
 
     #[test]
     fn a_page_that_does_not_fit_its_template_is_refused() {
-        let mut none = std::iter::empty();
-        let default = Edit::Default { file: "", from: "bias: 0.0", sentence: "by `" };
-        let changed = default.apply("Self { bias: 0.0 }", "by `even: 1.0`", &mut none);
-        assert_eq!(changed.unwrap(), "Self { even: 1.0 }");
-        assert_eq!(default.apply("Self {}", "by `even: 1.0`", &mut none), None);
-        assert_eq!(Edit::Append { file: "" }.apply("a", "", &mut none), None, "no block left");
+        let replace = Edit::Replace { file: "", from: "bias", to: "," };
+        let mut blocks = ["even = 1.0,".to_owned(), "even = 1.0,".to_owned()].into_iter();
+        assert_eq!(replace.apply("bias = 0.0, other", &mut blocks).unwrap(), "even = 1.0, other");
+        assert_eq!(replace.apply("Self {}", &mut blocks), None);
+        assert_eq!(Edit::Append { file: "" }.apply("a", &mut blocks), None, "no block left");
     }
 }
