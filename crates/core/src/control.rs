@@ -4,8 +4,6 @@ use crate::{DiffDrive, Frame, Inputs, Stamp, Track, Twist, WheelSpeeds};
 
 /// Speed, m/s or rad/s, that two digits show as zero.
 const STILL: f64 = 0.005;
-/// Speed, m/s, up to which the ramp to rest may pass zero for the next command.
-const SWING_MPS: f64 = 0.02;
 
 /// Velocity to drive, with a period of validity and a reason.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,12 +34,10 @@ impl Command {
         Self { twist, wheels, stamp, valid_until, reason }
     }
 
-    /// Returns the velocity as pages tell it: without what two digits round away, and without the
-    /// step below zero of a robot that only brakes.
+    /// Returns the velocity as pages tell it: without what two digits round away.
     pub fn told_twist(&self) -> Twist {
         let Twist { linear_mps, lateral_mps, angular_rps } = self.twist;
-        let is_still = linear_mps < STILL && linear_mps > -SWING_MPS;
-        let linear_mps = if is_still { 0.0 } else { linear_mps };
+        let linear_mps = if linear_mps.abs() < STILL { 0.0 } else { linear_mps };
         let lateral_mps = if lateral_mps.abs() < STILL { 0.0 } else { lateral_mps };
         let angular_rps = if angular_rps.abs() < STILL { 0.0 } else { angular_rps };
         Twist { linear_mps, lateral_mps, angular_rps }
@@ -378,10 +374,11 @@ mod tests {
     }
 
     #[test]
-    fn a_robot_that_only_brakes_has_no_negative_speed() {
-        assert_eq!(command(-0.015, 0.0, Reason::Near).told_twist(), Twist::STOP);
-        assert_eq!(command(-0.1, 0.0, Reason::Follow).told_twist().linear_mps, -0.1);
-        assert_eq!(command(0.015, 0.0, Reason::Near).told_twist().linear_mps, 0.015);
+    fn a_speed_is_told_with_its_sign() {
+        for told_mps in [-0.1, -0.015, 0.015] {
+            assert_eq!(command(told_mps, 0.0, Reason::Near).told_twist().linear_mps, told_mps);
+        }
+        assert_eq!(command(-0.004, 0.0, Reason::Near).told_twist(), Twist::STOP);
     }
 
     #[test]

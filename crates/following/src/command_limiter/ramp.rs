@@ -51,7 +51,10 @@ impl Axis {
         let fades = if off == 0.0 { 0.0 } else { 2.0 * off.abs() / (root + dt) };
         let wanted = fades.copysign(off).clamp(down, up);
         let accel = wanted.clamp(self.accel - jerk * dt, self.accel + jerk * dt);
-        let next = Self { speed: self.speed + accel * dt, accel };
+        let speed = self.speed + accel * dt;
+        // A speed that is taken for reached keeps a trace of acceleration, which must not turn it round.
+        let speed = if speed * target < 0.0 { 0.0 } else { speed };
+        let next = Self { speed, accel };
         if (next.speed - target).abs() < REACHED { Self { speed: target, accel } } else { next }
     }
 
