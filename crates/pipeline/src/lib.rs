@@ -75,7 +75,7 @@
 //! | `same person` | the weaker of two detections of one person |
 //! | `association not possible`, `associator` | an impossible pair; a detection already used up |
 //! | `rather a new person` | a pair with a track that was lost; the detection may start a track |
-//! | `tracked already` | a detection at the place of a track that is seen there |
+//! | `tracked already` | a detection at the place of a track that is seen there, or predicted there for sure |
 //! | `score`, `verifier` | a candidate that its detector or the verifiers call no person |
 //! | `doubt`, `clutter`, `no track fits` | a candidate that the track manager refuses |
 //! | `filter` | a match that the filter did not accept |

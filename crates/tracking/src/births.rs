@@ -7,7 +7,7 @@
 
 use std::f64::consts::TAU;
 
-use tagalong_core::{Associations, Detection, Track};
+use tagalong_core::{Associations, Detection, Estimate, Track};
 use tagalong_geometry::Camera;
 
 use crate::BirthSettings;
@@ -73,14 +73,26 @@ fn is_likelier(
     settings: &BirthSettings,
 ) -> bool {
     let births = births_per_m2(detection, camera, settings);
-    log_density(track, detection) + settings.appearance * log_ratio >= births.ln()
+    log_density(&track.estimate, detection) + settings.appearance * log_ratio >= births.ln()
 }
 
-/// Returns the logarithm of the density of a track's person at the place of a detection on the
+/// Returns true if a detection is at the place of a track's person rather than at that of a newcomer,
+/// whatever its height and appearance.
+pub(crate) fn is_at_place(
+    estimate: &Estimate,
+    detection: &Detection,
+    camera: &Camera,
+    settings: &BirthSettings,
+) -> bool {
+    let births = births_per_m2(detection, camera, settings);
+    !settings.are_off() && log_density(estimate, detection) >= births.ln()
+}
+
+/// Returns the logarithm of the density of an estimated person at the place of a detection on the
 /// floor, per m²; infinite where the covariance has no inverse.
-fn log_density(track: &Track, detection: &Detection) -> f64 {
-    let innovation = (detection.position - track.estimate.person.position).xy();
-    let prior = track.estimate.covariance.fixed_view::<2, 2>(0, 0);
+fn log_density(estimate: &Estimate, detection: &Detection) -> f64 {
+    let innovation = (detection.position - estimate.person.position).xy();
+    let prior = estimate.covariance.fixed_view::<2, 2>(0, 0);
     let spread = prior + detection.covariance.fixed_view::<2, 2>(0, 0);
     let Some(root) = spread.cholesky() else { return f64::INFINITY };
     let squared_distance = innovation.dot(&root.solve(&innovation));
@@ -104,7 +116,7 @@ fn births_per_m2(detection: &Detection, camera: &Camera, settings: &BirthSetting
 #[cfg(test)]
 mod tests {
     use nalgebra::{Matrix3, Point3, SMatrix, Vector2, Vector3};
-    use tagalong_core::{Estimate, Person, TrackId};
+    use tagalong_core::{Person, TrackId};
     use tagalong_geometry::{ImageBox, Pinhole, Rect};
 
     use super::*;
@@ -207,6 +219,20 @@ mod tests {
 
     #[test]
     fn a_track_without_uncertainty_keeps_its_detection() {
-        assert_eq!(log_density(&track(0.0, 0.0), &detection(270.0, 100.0)), f64::INFINITY);
+        let found = detection(270.0, 100.0);
+        assert_eq!(log_density(&track(0.0, 0.0).estimate, &found), f64::INFINITY);
+    }
+
+    #[test]
+    fn a_place_is_that_of_a_track_until_the_track_is_vague() {
+        fn is_taken(off_m: f64, variance_m2: f64, settings: &BirthSettings) -> bool {
+            let track = track(off_m, variance_m2);
+            is_at_place(&track.estimate, &detection(270.0, 100.0), &camera(), settings)
+        }
+
+        assert!(is_taken(0.2, 0.05, &SETTINGS));
+        assert!(!is_taken(1.0, 0.05, &SETTINGS), "beside it");
+        assert!(!is_taken(0.2, 4.0, &SETTINGS), "0.04 per m²");
+        assert!(!is_taken(0.2, 0.05, &BirthSettings::default()), "without densities");
     }
 }

@@ -40,7 +40,7 @@ settings! {
         pub max_detections: usize = 1024,
         /// Two tracks nearer to each other on the floor than this, m, in 3 of 5 frames belong to
         /// one person, and the older one is kept. A detection so near to a supported track starts
-        /// no track.
+        /// no track; with `[births]`, neither does one near a track that is predicted there for sure.
         #[schemars(range(min = 0.0))]
         pub duplicate_m: f64 = 0.2,
         /// Most tracks at a time; the ones with the lowest scores end.

@@ -84,6 +84,11 @@ impl TrackTable {
         self.records.get(&id).map(|record| record.observation)
     }
 
+    /// Returns true for a confirmed track.
+    pub(crate) fn is_confirmed(&self, id: TrackId) -> bool {
+        self.records.get(&id).is_some_and(|record| record.health.confirmed)
+    }
+
     /// Returns the detector that found a track last.
     pub(crate) fn detector(&self, id: TrackId) -> Option<usize> {
         self.records.get(&id).map(|record| record.detector)

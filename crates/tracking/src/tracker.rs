@@ -1,7 +1,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::{Guarded, StepError};
-use nalgebra::{Point2, Point3};
+use nalgebra::Point2;
 use tagalong_core::{
     Associations, Associator, Detection, EgoMotion, Estimate, Evidence, Filter, Frame, Gate,
     Initiation, Likelihood, Observation, ObservedTrack, Query, Track, TrackId, TrackManager,
@@ -9,7 +9,7 @@ use tagalong_core::{
 };
 use tagalong_vision::Describer;
 
-use crate::births::{remove_births, veto_births};
+use crate::births::{is_at_place, remove_births, veto_births};
 use crate::clock::{Clock, Tick};
 use crate::detections::{DetectionSet, PendingDetection};
 use crate::duplicates::DuplicateFinder;
@@ -481,18 +481,9 @@ impl Tracker {
         detections: &mut DetectionSet,
     ) -> Result<BTreeSet<TrackId>, StepError> {
         let mut started = BTreeSet::new();
-        let updated: Vec<Point3<f64>> = posterior
-            .estimates
-            .iter()
-            .filter(|(id, _)| posterior.supports.contains_key(id))
-            .map(|(_, estimate)| estimate.person.position)
-            .collect();
         for index in detections.undecided() {
             let pending = detections.get(index);
-            let is_tracked = updated.iter().any(|place| {
-                let away_m = (place - pending.detection.position).xy().norm();
-                away_m < self.settings.merge.duplicate_m
-            });
+            let is_tracked = self.is_tracked(frame, posterior, &pending.detection);
             let fate = match self.table.next_id() {
                 _ if is_tracked => Fate::Dropped("tracked already"),
                 Some(id) => self.initiate(frame, id, pending)?,
@@ -505,6 +496,23 @@ impl Tracker {
             detections.settle(index, fate);
         }
         Ok(started)
+    }
+
+    /// Returns true if a detection is where a track is, also one that is predicted there for sure: the
+    /// trunk of a person whose head has left the image fits no track, and is nobody else.
+    fn is_tracked(&self, frame: &Frame, posterior: &Posterior, detection: &Detection) -> bool {
+        let MergeSettings { duplicate_m, .. } = self.settings.merge;
+        for (id, estimate) in &posterior.estimates {
+            let away_m = (estimate.person.position - detection.position).xy().norm();
+            let is_supported = posterior.supports.contains_key(id);
+            let is_there = is_supported
+                || self.table.is_confirmed(*id)
+                    && is_at_place(estimate, detection, &frame.camera, &self.settings.births);
+            if is_there && away_m < duplicate_m {
+                return true;
+            }
+        }
+        false
     }
 
     /// Starts a track from a detection, if the manager agrees.

@@ -314,6 +314,26 @@ fn a_detection_beside_a_supported_track_starts_none() {
     assert_eq!((ids(&report.tracks), report.funnel.count("tracked already")), (vec![1, 2], 1));
 }
 
+/// The detection is too low for the track, as that of a trunk without its head. Two frames confirm a
+/// track.
+#[test]
+fn a_detection_where_a_lost_track_is_for_sure_starts_none() {
+    for (inside_per_m2, frames, numbers) in
+        [(0.05, 2, vec![1]), (0.05, 1, vec![1, 2]), (0.0, 2, vec![1, 2])]
+    {
+        let mut settings = TrackerSettings::default();
+        settings.births.inside_per_m2 = inside_per_m2;
+        let script = Script::of([person(3.0, 0.0)]);
+        let mut tracker = discovers(&script, settings);
+        run(&mut tracker, 1..=frames);
+        let low = Point3::new(3.0, 0.1, 0.6);
+        script.show([Detection::new("script", low, Matrix3::identity() * 0.01, 1.0)]);
+        let report = run(&mut tracker, frames + 1..=frames + 1);
+        assert_eq!(ids(&report.tracks), numbers, "{inside_per_m2} per m², {frames} frames");
+        assert!(!report.tracks.iter().any(|track| track.id.0 == 1 && track.seen), "it took it");
+    }
+}
+
 #[test]
 fn no_more_tracks_than_the_settings_say_are_kept() {
     let mut settings = TrackerSettings::default();

@@ -334,7 +334,7 @@ impl Reidentifier {
             }
             let reported = identity.reported;
             let too_late = identity.age_s > self.settings.decide_s;
-            let returned = self.returned(identity);
+            let returned = self.returned(identity, &self.lost_newcomers(tracks, track.id));
             let returned = returned.map(|index| self.absent.remove(index));
             let Some(identity) = self.tracks.get_mut(&track.id) else { continue };
             match returned {
@@ -356,8 +356,24 @@ impl Reidentifier {
         }
     }
 
-    /// Returns the index of the absent person whose track this is.
-    fn returned(&self, identity: &Identity) -> Option<usize> {
+    /// Returns the people of other lost tracks that have not been decided about: each may be anywhere, as
+    /// those without a track.
+    fn lost_newcomers(&self, tracks: &[Track], id: TrackId) -> Vec<Person> {
+        let mut people = Vec::new();
+        let lost = tracks.iter().filter(|track| track.confirmed && !track.seen);
+        for track in lost.filter(|track| track.id != id) {
+            let Some(identity) = self.tracks.get(&track.id) else { continue };
+            if identity.is_new && identity.rivals.is_empty() {
+                let mut identity = identity.clone();
+                identity.settle();
+                people.push(identity.person);
+            }
+        }
+        people
+    }
+
+    /// Returns the index of the absent person whose track this is; `lost` are people of lost tracks.
+    fn returned(&self, identity: &Identity, lost: &[Person]) -> Option<usize> {
         let ReidentificationSettings { max_difference, margin, .. } = self.settings;
         let seen = &identity.unsure;
         let differences = self.absent.iter().enumerate().filter(|(_, person)| {
@@ -368,7 +384,7 @@ impl Reidentifier {
         let (best, difference) = differences.min_by(|a, b| a.1.total_cmp(&b.1))?;
         let present = self.tracks.values().filter(|other| !other.is_new).map(|other| &other.person);
         let absent = self.absent.iter().enumerate().filter(|(i, _)| *i != best);
-        let mut others = present.chain(absent.map(|(_, person)| person));
+        let mut others = present.chain(absent.map(|(_, person)| person)).chain(lost);
         let is_clear = others
             .all(|person| person.difference(seen).is_none_or(|other| other >= difference + margin));
         (difference <= max_difference && is_clear).then_some(best)

@@ -92,6 +92,19 @@ fn one_who_may_be_either_of_two_gets_a_new_number() {
     assert_eq!(scene.show(30, &red, &[track(2, -0.8, 1.6), track(3, 0.8, 1.6)]), [2, 3]);
 }
 
+/// The second one, in red too and taller, was seen for half a second.
+#[test]
+fn one_who_may_be_the_person_of_a_lost_track_gets_a_new_number() {
+    for (is_seen, number) in [(true, 1), (false, 3)] {
+        let mut scene = Scene::new();
+        let red = frame(RED, RED);
+        scene.show(30, &red, &[track(1, 0.8, 1.6)]);
+        scene.show(5, &red, &[track(2, -0.8, 1.8)]);
+        let second = track(2, -0.8, 1.8).with_seen(is_seen);
+        assert_eq!(scene.show(1, &red, &[second, track(3, 0.8, 1.6)]), [2, number]);
+    }
+}
+
 #[test]
 fn a_person_who_is_long_gone_or_far_away_gets_a_new_number() {
     let red = frame(RED, RED);
