@@ -134,7 +134,7 @@ fn told(distances: &SafetyDistances) -> String {
          it stops {followed_m:.2} m before the followed person\n  \
          when it turns, its corners sweep a circle with a radius of {turning_radius_m:.2} m around \
          the middle of the robot\n  \
-         after the last image its command holds for {holds_s:.2} s, then zero is commanded, and the robot \
+         after the last image or scan its command holds for {holds_s:.2} s, then zero is commanded, and the robot \
          stands after {stands_after_s:.2} s and {stands_after_m:.2} m in all\n"
     );
     if let Some(ahead_m) = stop_polygon_m {

@@ -103,6 +103,31 @@ fn the_truth_of_another_log_is_noted_in_all_forms_of_the_report() {
     }
 }
 
+/// The recording has another name, and another log has its name.
+#[test]
+fn a_log_with_which_a_pipeline_was_made_is_noted_by_its_contents() {
+    let Some(logs) = tagalong_conformance::testdata::find("logs") else { return };
+    let home = Home::new();
+    for ending in ["mcap", "people.csv"] {
+        let short = home.path(&format!("logs/short.{ending}"));
+        fs::rename(short, home.path(&format!("logs/um.{ending}"))).expect("a simulated log");
+        fs::copy(logs.join(format!("um.{ending}")), home.path(&format!("logs/hall.{ending}")))
+            .expect("a recording");
+    }
+    let configs = ["--configs", "depth-ekf", "configs/near.toml", "-o", "out"];
+    let output =
+        home.bench(&[&["--logs", "logs/um.mcap", "logs/hall.mcap"][..], &configs].concat());
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    let said = text(&output.stdout);
+    let json = home.report("out")["notes"].to_string();
+    let page = fs::read_to_string(home.path("out/report.html")).expect("a report");
+    let note = "models or settings of depth-ekf were made with hall: figures there say little about another \
+                room";
+    for form in [&said, &json, &page] {
+        assert_eq!(form.matches(note).count(), 1, "{form}");
+    }
+}
+
 #[test]
 fn places_on_the_floor_are_truth_beside_a_log() {
     let home = Home::new();
