@@ -111,6 +111,12 @@ mod tests {
     }
 
     #[test]
+    fn the_sums_have_the_size_of_the_image_and_one_more() {
+        let sums = Integral::new(&GreyImage::filled(12, 9, 1));
+        assert_eq!((sums.width(), sums.height(), sums.stride()), (12, 9, 13));
+    }
+
+    #[test]
     fn an_image_without_pixels_has_no_sums() {
         let empty = Integral::new(&GreyImage::filled(0, 0, 9));
         assert_eq!((empty.sum(0, 0, 5, 5), empty.stride()), (0, 1));

@@ -239,6 +239,16 @@ mod tests {
     }
 
     #[test]
+    fn the_trunk_is_in_the_middle_of_the_box() {
+        let area = trunk_area(&Rect::new(100.0, 50.0, 80.0, 200.0));
+        assert!((area.centre().x - 140.0).abs() < 1e-9, "{area:?}");
+        assert!((area.width - TRUNK_WIDTH * 80.0).abs() < 1e-9, "{area:?}");
+        let (first, last) = TRUNK_ROWS;
+        assert!((area.y - (50.0 + first * 200.0)).abs() < 1e-9, "{area:?}");
+        assert!((area.bottom() - (50.0 + last * 200.0)).abs() < 1e-9, "{area:?}");
+    }
+
+    #[test]
     fn a_desk_before_the_legs_is_not_the_person() {
         let mut depth = person(3.0, 320.0, 150.0);
         depth.pixels_mut()[320 * 640..].fill(1.5);

@@ -323,6 +323,19 @@ mod tests {
     }
 
     #[test]
+    fn the_quarters_of_even_and_of_odd_frames_are_the_parts() {
+        for (quarter, left, top) in [(0, 30, 20), (1, 100, 20), (2, 30, 70), (3, 100, 70)] {
+            let mut overlap = EdgeOverlap::new(OverlapSettings::default());
+            let (grey, depth) = scene([0, 0], &[(left, top, 24)]);
+            for expected in [vec![quarter], vec![quarter, quarter + 4]] {
+                overlap.add(&grey, &depth);
+                let with_outlines = (0..PARTS).filter(|part| overlap.parts[*part].1 > 0);
+                assert_eq!(with_outlines.collect::<Vec<_>>(), expected);
+            }
+        }
+    }
+
+    #[test]
     fn the_gain_is_what_the_offset_adds_to_none() {
         fn gain(offset: [i64; 2]) -> f64 {
             let mut overlap = EdgeOverlap::new(OverlapSettings::default());

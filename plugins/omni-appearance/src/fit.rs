@@ -323,6 +323,31 @@ mod tests {
         }
     }
 
+    /// Without an error there is the decay alone: 0.8 for two samples and four weights.
+    #[test]
+    fn a_step_without_errors_makes_the_weights_smaller() {
+        let network = Network {
+            mean: vec![0.0],
+            scale: vec![1.0],
+            target: [0.0, 1.0],
+            hidden: vec![vec![0.5, -0.25]],
+            output: vec![2.0, 0.125],
+        };
+        let before = weights_of(&network);
+        let inputs = [vec![1.0], vec![-2.0]];
+        let answers = inputs.each_ref().map(|x| network.answer(x));
+        for descent in [Descent::BackPropagation { rate: 0.25 }, Descent::Marquardt] {
+            let step = Fit { decay: 0.8, steps: 1, descent, ..FIT };
+            let (_, after) = step.descend(network.clone(), &inputs, &answers);
+            let after = weights_of(&after);
+            assert!(after.norm() < before.norm(), "{descent:?}: {after}");
+            if let Descent::BackPropagation { rate } = descent {
+                let expected = &before * (1.0 - rate * 0.8 / 4.0);
+                assert!((after - expected).amax() < 1e-12, "one step along the decay");
+            }
+        }
+    }
+
     #[test]
     fn numbers_of_pixels_must_be_scaled_for_back_propagation() {
         // An input of some hundred pixels, like the third feature.

@@ -223,9 +223,20 @@ mod tests {
     }
 
     #[test]
+    fn one_colour_that_differs_is_enough() {
+        let config = Config { column_pixels: 1, ..Config::default() };
+        let mut background = Background::new(4, 1);
+        background.add(&[200; 12], &config);
+        let mut segmenter = Segmenter::new(4, &config);
+        let colours = [50, 200, 200, 200, 50, 200, 200, 200, 50, 200, 200, 200];
+        segmenter.compare(&colours, &background, true, &config);
+        assert_eq!(segmenter.counts().taken, [1, 1, 1, 0]);
+    }
+
+    #[test]
     fn two_people_who_touch_are_divided_and_one_is_not() {
         let run = Run { first: 8, length: 8 };
-        let two = [20, 40, 38, 4, 3, 30, 41, 20];
+        let two = [20, 40, 38, 4, 3, 31, 41, 20];
         let one = [5, 20, 40, 45, 38, 40, 20, 6];
         let [both, alone] = [two, one].map(|counts| {
             let mut columns = [0u16; 12];

@@ -9,7 +9,7 @@ use tagalong_core::{
 };
 use tagalong_geometry::{Camera, ConicalMirror, Lens, Panorama, Rect};
 
-use crate::{AfterMeasuring, Config, Distance, Model, OmniAppearance};
+use crate::{AfterMeasuring, Config, Distance, Eyes, Model, OmniAppearance};
 
 const COLUMNS: usize = 480;
 const ROWS: usize = 120;
@@ -99,6 +99,24 @@ fn people_are_found_all_around_and_across_the_seam() {
         assert!(person.is_sane() && person.covariance.cholesky().is_some());
         let region = person.rect().unwrap();
         assert!(region.x >= 0.0 && region.x < COLUMNS as f64, "{region:?}");
+    }
+}
+
+#[test]
+fn panoramas_of_fewer_than_eight_columns_or_rows_are_not_looked_at() {
+    let large = camera(1.5);
+    for (columns, rows, dropped) in [(8, 8, 0), (9, 10, 0), (7, 8, 1), (8, 7, 1), (3, 3, 1)] {
+        let panorama = Panorama { columns, rows, ..*large.panorama().expect("a panorama") };
+        let lens = Lens::Panorama(panorama);
+        let camera = Arc::new(Camera { lens, width: columns, height: rows, ..(*large).clone() });
+        let image = Arc::new(RgbImage::filled(columns, rows, [90; 3]));
+        let images = Images { colour: Some(image), ..Images::default() };
+        let frame = Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.3), images);
+        let mut funnel = Funnel::default();
+        let mut eyes = Eyes::new(Config::default()).expect("usual settings");
+        let blobs = eyes.look(&frame, &mut funnel).expect("the frame has an image");
+        assert!(blobs.is_empty(), "there is no background yet");
+        assert_eq!(funnel.count("image of another size"), dropped, "{columns} x {rows}");
     }
 }
 

@@ -338,6 +338,20 @@ mod tests {
     }
 
     #[test]
+    fn a_robot_moves_that_goes_by_two_millimetres_or_turns_by_one_milliradian() {
+        for (forward, left, turn, expected) in [
+            (0.0019, 0.0, 0.0009, false),
+            (0.0021, 0.0, 0.0, true),
+            (0.0, -0.0021, 0.0, true),
+            (0.0015, 0.0015, 0.0, true),
+            (0.0, 0.0, -0.0011, true),
+        ] {
+            let motion = EgoMotion { forward, left, turn, ..EgoMotion::at_rest(0.1) };
+            assert_eq!(is_moving(&motion), expected, "{forward} {left} {turn}");
+        }
+    }
+
+    #[test]
     fn a_wall_is_found_at_its_distance() {
         let camera = camera();
         let panorama = camera.panorama().unwrap();

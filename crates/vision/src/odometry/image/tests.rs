@@ -252,6 +252,26 @@ fn the_motion_of_the_log_is_believed() {
 }
 
 #[test]
+fn an_image_is_halved_while_its_shorter_side_stays_long_enough() {
+    const LEAST: usize = LEAST_SIDE_PX;
+    for (width, height, count) in [
+        (9 * LEAST, 2 * LEAST - 1, 1),
+        (2 * LEAST, 9 * LEAST, 2),
+        (4 * LEAST - 1, 4 * LEAST, 2),
+        (4 * LEAST, 4 * LEAST, 3),
+        (17 * LEAST, 16 * LEAST, LEVELS),
+    ] {
+        let sizes: Vec<[usize; 2]> = levels(&GreyImage::filled(width, height, 9))
+            .iter()
+            .map(|level| [level.width(), level.height()])
+            .collect();
+        let expected: Vec<[usize; 2]> =
+            (0..count).map(|level| [width >> level, height >> level]).collect();
+        assert_eq!(sizes, expected);
+    }
+}
+
+#[test]
 fn after_a_jump_of_the_clock_nothing_is_compared() {
     let mut stage = CameraMotion::new(settings());
     let mut funnel = Funnel::default();
