@@ -271,7 +271,13 @@ mod tests {
             log_name: "hall".into(),
             log: "logs/hall.mcap".into(),
             truth: "logs/hall.people.csv".into(),
-            ..Task::default()
+            whole_bodies: false,
+            drops_doubled_ids: false,
+            seed: 0,
+            inputs: BTreeMap::new(),
+            copy_of: None,
+            version: String::new(),
+            skip: None,
         }
     }
 }
