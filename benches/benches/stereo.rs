@@ -11,7 +11,6 @@ use std::time::Duration;
 use cpu_time::ThreadTime;
 use criterion::measurement::{Measurement, ValueFormatter, WallTime};
 use criterion::{Criterion, criterion_group, criterion_main};
-use tagalong_config::Registry;
 use tagalong_core::{EgoMotion, Frame, GreyImage, Images, Stamp};
 use tagalong_geometry::Camera;
 use tagalong_pipeline::{FrameReport, Pipeline};
@@ -142,8 +141,7 @@ struct Bench {
 
 impl Bench {
     fn new(config: &str, method: &str, (camera, images): (Arc<Camera>, Images)) -> Self {
-        let mut registry = Registry::default();
-        tagalong_catalog::register(&mut registry);
+        let registry = tagalong_catalog::registry();
         let mut config: toml::Table = config.parse().expect("a shipped config");
         let stereo = config["stereo"].as_table_mut().expect("it matches pairs");
         stereo.insert("method".into(), method.into());

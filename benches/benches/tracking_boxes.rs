@@ -8,7 +8,6 @@ use std::sync::Arc;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use tagalong_benches::square::{camera, frame, track};
 use tagalong_compressive::{Compressive, Config};
-use tagalong_config::Registry;
 use tagalong_core::{Detector, EgoMotion, ExternalDetection, Frame, Funnel, Images, Query, Stamp};
 use tagalong_correlation::Correlation;
 use tagalong_geometry::Rect;
@@ -71,8 +70,7 @@ fn recorded(index: u64) -> Vec<ExternalDetection> {
 
 fn boxes(criterion: &mut Criterion) {
     let camera = camera();
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong_catalog::registry();
     let frames: Vec<Frame> = (1..=200)
         .map(|index| {
             let stamp = Stamp::default().plus_seconds(index as f64 * 0.04);

@@ -28,8 +28,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         log = paths.next().ok_or("expected: --once LOG CONFIG...")?;
     }
     let runs = if is_once { 1 } else { RUNS };
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong_catalog::registry();
     println!("| config | log | p50 [ms] | p95 | p99 | slowest | slowest / p50 | frame | stage |");
     println!("|---|---|---|---|---|---|---|---|---|");
     for config in paths {

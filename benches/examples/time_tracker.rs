@@ -13,7 +13,6 @@ use nalgebra::{Matrix3, Point3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_benches::timing::statistic_us;
-use tagalong_config::Registry;
 use tagalong_core::{
     Capabilities, Detection, Detector, EgoMotion, Frame, Funnel, Images, Inputs, Query, Result,
     Stamp,
@@ -68,8 +67,7 @@ impl Detector for Grid {
 }
 
 fn median_us(people: usize) -> f64 {
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let mut registry = tagalong_catalog::registry();
     registry.detector("grid", "people on a grid", |settings: GridSettings, _| {
         Ok(Grid { people: settings.people, random: SplitMix64::new(1) })
     });

@@ -6,7 +6,6 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use tagalong_config::Registry;
 use tagalong_log::{InputSettings, Limits};
 use tagalong_pipeline::{BuildError, ConfigSource, Pipeline};
 
@@ -35,8 +34,7 @@ fn build(text: &str) -> Result<Pipeline, BuildError> {
 
 /// Builds a config that refers to files beside the configs of this folder.
 fn build_in(folder: &Path, text: &str) -> Result<Pipeline, BuildError> {
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong_catalog::registry();
     let source = ConfigSource::from_text(text, folder).with_name("my.toml");
     Pipeline::builder(&registry).build(&source)
 }

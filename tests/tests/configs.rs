@@ -65,8 +65,7 @@ fn a_config_begins_with_when_to_take_it() {
 
 #[test]
 fn a_config_states_only_what_is_special_about_it() {
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong_catalog::registry();
     let mut needless = Vec::new();
     for (name, text) in configs() {
         let table: Table = text.parse().unwrap();

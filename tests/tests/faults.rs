@@ -6,7 +6,6 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use tagalong_config::Registry;
 use tagalong_core::{DepthImage, EgoMotion, Frame, Images, Stamp, Track, WheelSpeeds};
 use tagalong_geometry::{Camera, Lens};
 use tagalong_log::msgs::{CameraInfo, Header, Image, TFMessage, TransformStamped};
@@ -32,8 +31,7 @@ fn shots() -> (Camera, Vec<Shot>) {
 }
 
 fn pipeline(config: &str) -> Pipeline {
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong_catalog::registry();
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
     let text = std::fs::read_to_string(folder.join(config)).unwrap();
     Pipeline::builder(&registry).folder(&folder).from_toml(&text).unwrap()

@@ -5,7 +5,6 @@ use std::path::Path;
 use std::sync::Arc;
 
 use nalgebra::Isometry2;
-use tagalong_config::Registry;
 use tagalong_core::{EgoMotion, Frame, Stamp, TrackId};
 use tagalong_geometry::Camera;
 use tagalong_pipeline::Pipeline;
@@ -47,8 +46,7 @@ impl Recorder {
 }
 
 fn pipeline() -> Pipeline {
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong_catalog::registry();
     let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
     let text = std::fs::read_to_string(configs.join("depth-ekf-follow.toml")).unwrap();
     Pipeline::builder(&registry).folder(&configs).from_toml(&text).unwrap()

@@ -9,7 +9,6 @@ use std::path::Path;
 
 use legs::Legs;
 use nalgebra::Point2;
-use tagalong_config::Registry;
 use tagalong_eval::formats::floor;
 use tagalong_geometry::Rect;
 use tagalong_log::{FrameSource, InputSettings, Limits};
@@ -25,8 +24,7 @@ fn source(name: &str, pipeline: &Pipeline) -> Option<FrameSource> {
 }
 
 fn pipeline() -> Pipeline {
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let mut registry = tagalong_catalog::registry();
     registry.detector("legs", "pairs of legs", |legs: Legs, _| Ok(legs));
     Pipeline::builder(&registry).from_toml(CONFIG).unwrap()
 }
@@ -79,8 +77,7 @@ const LEGS: &str = "[[detectors]]\nplugin = \"laser-legs\"\n[filter]\nplugin = \
 /// stay where they are.
 #[test]
 fn people_at_rest_stay_at_rest_while_the_robot_drives() {
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong_catalog::registry();
     let mut pipeline = Pipeline::builder(&registry).from_toml(LEGS).unwrap();
     let Some(mut source) = source("laser/laser-moving.mcap", &pipeline) else { return };
     let truth =
@@ -127,8 +124,7 @@ fn people_at_rest_stay_at_rest_while_the_robot_drives() {
 fn a_person_who_stands_still_starts_a_track() {
     let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
     let text = std::fs::read_to_string(configs.join("laser-follow.toml")).unwrap();
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong_catalog::registry();
     let mut pipeline = Pipeline::builder(&registry).folder(&configs).from_toml(&text).unwrap();
     let Some(mut source) = source("laser/laser-following.mcap", &pipeline) else { return };
     let truth =

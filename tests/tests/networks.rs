@@ -6,7 +6,6 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use tagalong_config::Registry;
 use tagalong_core::{EgoMotion, Frame, Images, RgbImage, Stamp};
 use tagalong_geometry::{Camera, Pinhole, Rect};
 use tagalong_pipeline::{FrameReport, Pipeline};
@@ -68,8 +67,7 @@ fn frame(index: u64) -> Frame {
 }
 
 fn run(follower: bool) -> Vec<FrameReport> {
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong_catalog::registry();
     let models = root().join("crates/network/tests/models");
     let text = config(follower);
     let built = Pipeline::builder(&registry).folder(&models).from_toml(&text);

@@ -6,7 +6,6 @@ use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
-use tagalong_config::Registry;
 use tagalong_core::{RgbImage, Stamp};
 use tagalong_geometry::Panorama;
 use tagalong_log::camera_info::{CONICAL_MIRROR, UNWRAPPED, mirror_coefficients};
@@ -27,12 +26,6 @@ const FRAMES_OF_A_LOG: usize = 12;
 /// Name of the camera's frame.
 const CAMERA: &str = "camera";
 
-fn registry() -> Registry {
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
-    registry
-}
-
 fn configs() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs")
 }
@@ -46,7 +39,7 @@ fn contender(name: &str) -> Contender {
 fn a_person_who_crosses_the_seam_keeps_identity_and_place() {
     let scene = Scene::parse(ROOM).unwrap();
     let contenders = [contender("omni-rich"), contender("omni-ekf"), contender("omni-appearance")];
-    let trial = Trial::new(&scene, &contenders, &registry(), 2).unwrap();
+    let trial = Trial::new(&scene, &contenders, &tagalong_catalog::registry(), 2).unwrap();
     let sides: BTreeSet<bool> = trial
         .moments
         .iter()
@@ -132,7 +125,8 @@ fn seen(path: &Path) -> (Vec<(Stamp, RgbImage)>, Places) {
     // A short log has few images from which to learn the background.
     let few = "[[detectors]]\nplugin = \"omni-appearance\"\nconfig = { distance = \"rich\", \
                background_frames = 6 }\n[filter]\nplugin = \"floor-kalman\"\n";
-    let mut pipeline = Contender::new("few", few).pipeline(&registry(), 0).unwrap();
+    let mut pipeline =
+        Contender::new("few", few).pipeline(&tagalong_catalog::registry(), 0).unwrap();
     let inputs = Inputs::ANY.require(Input::Colour);
     let input = InputSettings::default();
     let limits = Limits::default();

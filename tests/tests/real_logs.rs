@@ -10,7 +10,6 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use tagalong_config::Registry;
 use tagalong_core::Funnel;
 use tagalong_log::{FrameSource, InputSettings, Limits};
 use tagalong_pipeline::Pipeline;
@@ -33,8 +32,7 @@ fn data(file: &str) -> Option<PathBuf> {
 fn run(path: &Path, config: &str) -> Run {
     let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
     let text = std::fs::read_to_string(configs.join(format!("{config}.toml"))).unwrap();
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong_catalog::registry();
     let mut pipeline = Pipeline::builder(&registry).folder(&configs).from_toml(&text).unwrap();
     let mut source =
         FrameSource::open(path, &InputSettings::default(), &Limits::default(), pipeline.inputs())

@@ -3,7 +3,6 @@
 
 use std::path::Path;
 
-use tagalong_config::Registry;
 use tagalong_core::Reason;
 use tagalong_sim::{FaultKind, InjectedFault, Scene, Variant};
 use tagalong_trials::{Contender, Ride, Tick};
@@ -31,8 +30,7 @@ fn ride_of(folder: &str, config: &str, kind: FaultKind) -> Ride {
     let mut scene = Scene::parse_with(include_str!("../scenes/small-room.toml"), &walk).unwrap();
     scene.faults.inject.push(InjectedFault::new(kind).at(AT_S));
     scene.check_faults().unwrap();
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong_catalog::registry();
     let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(folder);
     let text = std::fs::read_to_string(configs.join(config).with_extension("toml")).unwrap();
     let contender = Contender { folder: configs, ..Contender::new(config, text) };

@@ -5,7 +5,6 @@
 
 use std::path::Path;
 
-use tagalong_config::Registry;
 use tagalong_core::Frame;
 use tagalong_pipeline::{FrameReport, Pipeline, with_values};
 use tagalong_sim::Scene;
@@ -29,8 +28,7 @@ const CHANGES: [(&str, &str); 4] = [
 /// Returns shipped configs, and each with every change to which it has a key.
 fn pipelines() -> Vec<Pipeline> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong_catalog::registry();
     let mut all = Vec::new();
     for name in ["depth-ekf", "depth-color-ekf", "depth-svm-ekf", "rgbd-ekf"] {
         let text = std::fs::read_to_string(folder.join(format!("{name}.toml"))).unwrap();

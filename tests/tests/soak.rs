@@ -6,7 +6,6 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use tagalong_config::Registry;
 use tagalong_core::{DepthImage, EgoMotion, ExternalDetection, Frame, Images, Stamp, WheelSpeeds};
 use tagalong_geometry::{Camera, Pinhole, Rect};
 use tagalong_pipeline::Pipeline;
@@ -19,8 +18,7 @@ fn alone() -> MutexGuard<'static, ()> {
 }
 
 fn pipeline(config: &str) -> Pipeline {
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong_catalog::registry();
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
     let text = std::fs::read_to_string(folder.join(config)).unwrap();
     Pipeline::builder(&registry).folder(&folder).from_toml(&text).unwrap()

@@ -9,7 +9,6 @@
 use std::path::Path;
 
 use nalgebra::Point2;
-use tagalong_config::Registry;
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Limits};
 use tagalong_pipeline::{FrameReport, Pipeline};
 
@@ -24,8 +23,7 @@ fn reports() -> Option<Vec<FrameReport>> {
     let text = std::fs::read_to_string(configs.join("stereo-street.toml")).unwrap();
     // The log has no odometry, without which no robot drives unless the config says so.
     let text = format!("robot.odometry = \"none\"\n{text}");
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong_catalog::registry();
     let mut pipeline = Pipeline::builder(&registry).folder(&configs).from_toml(&text).unwrap();
     let inputs = Inputs::ANY.require(Input::Colour).require(Input::Right);
     let mut source =

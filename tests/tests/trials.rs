@@ -4,7 +4,6 @@
 
 use std::path::Path;
 
-use tagalong_config::Registry;
 use tagalong_eval::Tally;
 use tagalong_sim::{Scene, Variant};
 use tagalong_trials::{Contender, Judge, each};
@@ -16,12 +15,6 @@ const SCENE: &str = "duration_s = 6.0\n[camera]\nwidth = 320\nheight = 240\n\
     path = [[2.2, 2.2], [2.8, 3.4]]\nspeed_mps = 0.5\n\
     [[people]]\npath = [[3.8, 4.4], [3.8, 1.6]]\nspeed_mps = 0.8\n\
     [[people]]\npath = [[4.8, 1.4], [4.8, 4.8]]\nspeed_mps = 0.8\n";
-
-fn registry() -> Registry {
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
-    registry
-}
 
 fn contenders(names: &[&str]) -> Vec<Contender> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
@@ -49,7 +42,7 @@ fn judged(names: &[&str], scenes: &[Scene], threads: usize) -> Vec<Vec<Tally>> {
         let judge = Judge::default();
         trial.runs.iter().map(|run| Ok(judge.judge(&trial, run)?.tally)).collect()
     };
-    each(scenes, &contenders(names), &registry(), threads, keep, |_| ()).unwrap()
+    each(scenes, &contenders(names), &tagalong_catalog::registry(), threads, keep, |_| ()).unwrap()
 }
 
 #[test]

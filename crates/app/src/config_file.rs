@@ -292,8 +292,7 @@ mod tests {
 
     /// The message of a config that names this network, which no file holds.
     fn refusal_of(model: &str) -> String {
-        let mut registry = Registry::default();
-        tagalong_catalog::register(&mut registry);
+        let registry = tagalong_catalog::registry();
         let folder = tempfile::tempdir().expect("a folder");
         let text = format!(
             "[[detectors]]\nplugin = 'onnx'\nconfig = {{ model = '{model}' }}\n\
@@ -309,8 +308,7 @@ mod tests {
                     type = 'range'\ntopic = '/sonar'\nmount = [0.3, 0, 0.2, 0, 0, 90]\n\
                     [[collision_monitor.sources]]\nname = 'rear'\ntype = 'depth'\n\
                     topic = '/rear/depth'\ninfo_topic = '/rear/info'\n";
-        let mut registry = Registry::default();
-        tagalong_catalog::register(&mut registry);
+        let registry = tagalong_catalog::registry();
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
         let config = ConfigFile::of_text(text.to_owned(), &folder);
         let (pipeline, _) = config.pipeline(&registry, None).unwrap();

@@ -428,12 +428,6 @@ mod tests {
     use super::*;
     use crate::config_file::OuterSettings;
 
-    fn registry() -> Registry {
-        let mut registry = Registry::default();
-        tagalong_catalog::register(&mut registry);
-        registry
-    }
-
     fn keys(text: &str) -> impl Iterator<Item = String> {
         text.lines()
             .filter_map(|line| Some(line.trim_start_matches("# ").split_once(" =")?.0.to_owned()))
@@ -441,7 +435,7 @@ mod tests {
 
     #[test]
     fn every_setting_of_a_remedy_exists() {
-        let registry = registry();
+        let registry = tagalong_catalog::registry();
         let mut known: BTreeSet<String> = BTreeSet::new();
         registry.plugins().for_each(|plugin| known.extend(keys(&plugin.defaults())));
         known.extend(keys(&commented_defaults::<PipelineSettings>()));
@@ -462,7 +456,7 @@ mod tests {
 
     #[test]
     fn every_offer_fits_its_plugin() {
-        let registry = registry();
+        let registry = tagalong_catalog::registry();
         let remedies = Remedies::new(&registry);
         assert!(remedies.offers.len() > 2);
         for offer in &remedies.offers {
@@ -517,7 +511,7 @@ mod tests {
 
     #[test]
     fn each_manager_names_its_settings_for_a_track_that_is_not_confirmed() {
-        let remedies = Remedies::new(&registry());
+        let remedies = Remedies::new(&tagalong_catalog::registry());
         let sprt: Table = toml::from_str(
             "[manager]\nplugin = 'manage-sprt'\n[manager.config]\ntentative_misses = 2\n\
              confirm_log_odds = 4.6\n",
@@ -536,7 +530,7 @@ mod tests {
 
     #[test]
     fn stages_are_in_the_order_in_which_a_candidate_passes_the_tests() {
-        let remedies = Remedies::new(&registry());
+        let remedies = Remedies::new(&tagalong_catalog::registry());
         let config: Table = toml::from_str(
             "[[detectors]]\nplugin = 'depth-template'\n[detectors.config]\nmin_body = 0.5\n\
              discover_cost = 0.2\nfollow_radius_m = 1.0\n[manager]\nplugin = 'manage-sprt'\n\
@@ -556,7 +550,7 @@ mod tests {
              [[detectors]]\nplugin = 'depth-template'\n[detectors.config]\nmin_head_height_m = 1\ndiscover_cost = 0.2\n",
         )
         .unwrap();
-        let offered = Remedies::new(&registry()).offered(&resolved);
+        let offered = Remedies::new(&tagalong_catalog::registry()).offered(&resolved);
         let lines: Vec<String> = offered.into_iter().map(|change| change.line).collect();
         assert!(!lines.iter().any(|line| line.contains("manage-sprt")), "{lines:?}");
         assert!(!lines.iter().any(|line| line.contains("min_head_height_m")), "{lines:?}");
@@ -565,7 +559,7 @@ mod tests {
         assert!(!costs.is_empty(), "{lines:?}");
         assert!(!costs.iter().any(|line| line.contains("= 0.2 ")), "{costs:?}");
         let other: Table = toml::from_str("[manager]\nplugin = 'm'\n").unwrap();
-        let offered = Remedies::new(&registry()).offered(&other);
+        let offered = Remedies::new(&tagalong_catalog::registry()).offered(&other);
         assert_eq!(offered[0].line, "[manager] plugin = \"manage-sprt\"");
     }
 

@@ -40,14 +40,12 @@ pub fn unable<'a>(
 
 #[cfg(test)]
 mod tests {
-    use tagalong_config::Registry;
 
     use super::*;
 
     /// Returns the reason for a pipeline whose funnel has these tests.
     fn reason(tests: &[&str], has_people: bool) -> Option<String> {
-        let mut registry = Registry::default();
-        tagalong_catalog::register(&mut registry);
+        let registry = tagalong_catalog::registry();
         unable("some", tests.iter().copied(), has_people, &Remedies::new(&registry))
     }
 

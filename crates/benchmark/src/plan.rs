@@ -26,7 +26,7 @@ use super::made_with;
 const FILE: &str = "file ";
 
 /// One pipeline on one log with one seed.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Task {
     /// Its number in the plan, from 1.
     pub k: usize,

@@ -1,15 +1,14 @@
 //! List of all plugin crates.
 //!
-//! No code runs before `main`: a program owns a [`Registry`] and passes it to [`register`]. A
-//! plugin that is not listed here is unknown to the `tagalong` command, and `cargo xtask tidy`
-//! fails on a plugin folder that is not listed. `cargo xtask new-plugin` inserts its line in sorted
-//! order.
+//! No code runs before `main`: a program owns the [`Registry`] that [`registry`] returns, or passes
+//! its own to [`register`]. A plugin that is not listed here is unknown to the `tagalong` command,
+//! and `cargo xtask tidy` fails on a plugin folder that is not listed. `cargo xtask new-plugin`
+//! inserts its line in sorted order.
 //!
 //! ```
-//! use tagalong_config::{Kind, Registry};
+//! use tagalong_config::Kind;
 //!
-//! let mut registry = Registry::default();
-//! tagalong_catalog::register(&mut registry);
+//! let registry = tagalong_catalog::registry();
 //! assert_eq!(registry.find("ekf")?.kind, Kind::Filter);
 //! assert!(registry.find("ekff").is_err(), "the error names `ekf`");
 //! # Ok::<(), tagalong_config::ConfigError>(())
@@ -37,4 +36,11 @@ pub fn register(registry: &mut Registry) {
     tagalong_recorded_detections::register(registry);
     tagalong_svm_patch::register(registry);
     tagalong_track_managers::register(registry);
+}
+
+/// Returns a registry with every plugin of the workspace.
+pub fn registry() -> Registry {
+    let mut registry = Registry::default();
+    register(&mut registry);
+    registry
 }

@@ -12,7 +12,6 @@
 use std::error::Error;
 use std::time::Duration;
 
-use tagalong_config::Registry;
 use tagalong_core::{Command, Stamp};
 use tagalong_pipeline::Pipeline;
 use tagalong_sim::{Event, Scene, Variant};
@@ -22,8 +21,7 @@ use tagalong_trials::Draw;
 const SECONDS: f64 = 8.0;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong_catalog::registry();
     let builder = Pipeline::builder(&registry);
     let mut pipeline = builder.from_toml_file("configs/follow-depth.toml")?;
 

@@ -10,7 +10,6 @@ use std::error::Error;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use tagalong_config::Registry;
 use tagalong_core::{Frame, Stamp};
 use tagalong_pipeline::{Choice, Enrollment, Pipeline};
 use tagalong_sim::{Scene, Variant};
@@ -43,8 +42,7 @@ struct Part {
 
 fn main() -> Result<ExitCode, Box<dyn Error>> {
     let hours: f64 = std::env::args().nth(1).map_or(Ok(1.0), |hours| hours.parse())?;
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong_catalog::registry();
     let builder = Pipeline::builder(&registry);
     let mut pipeline = builder.from_toml_file("configs/follow-depth.toml")?;
     println!(

@@ -246,15 +246,10 @@ fn rename(value: &mut Value, owner: &str) {
 mod tests {
     use super::*;
 
-    fn registry() -> Registry {
-        let mut registry = Registry::default();
-        tagalong_catalog::register(&mut registry);
-        registry
-    }
-
     #[test]
     fn the_table_has_every_key_of_every_plugin() {
-        let (registry, text) = (registry(), markdown(&registry()));
+        let (registry, text) =
+            (tagalong_catalog::registry(), markdown(&tagalong_catalog::registry()));
         for plugin in registry.plugins() {
             for key in plugin.schema()["properties"].as_object().into_iter().flatten() {
                 assert!(text.contains(&format!("| `{}", key.0)), "{} of {}", key.0, plugin.name);
@@ -288,7 +283,7 @@ mod tests {
 
     #[test]
     fn the_schema_hangs_together_and_knows_the_sections() {
-        let schema = schema(&registry());
+        let schema = schema(&tagalong_catalog::registry());
         check_references(&schema, &schema);
         let properties = schema["properties"].as_object().unwrap();
         for section in ["detectors", "filter", "input", "manager", "merge", "seed"] {

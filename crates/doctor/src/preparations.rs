@@ -220,8 +220,7 @@ mod tests {
     }
 
     fn preparations(config: &str, frames: &[Frame], always: bool) -> Option<Preparations> {
-        let mut registry = Registry::default();
-        tagalong_catalog::register(&mut registry);
+        let registry = tagalong_catalog::registry();
         let wheels = DiffDrive { half_separation_m: 0.2, slip: 0.0 };
         let context = Context::new(0, models(), wheels);
         let config: Table = config.parse().unwrap();

@@ -371,11 +371,7 @@ fn images(bytes: &[u8], _: &Path) {
 
 fn config(bytes: &[u8], _: &Path) {
     thread_local! {
-        static REGISTRY: Registry = {
-            let mut registry = Registry::default();
-            tagalong_catalog::register(&mut registry);
-            registry
-        };
+        static REGISTRY: Registry = tagalong_catalog::registry();
     }
     as_text(bytes, |text| {
         REGISTRY.with(|registry| drop(Pipeline::builder(registry).from_toml(text)));

@@ -1,6 +1,5 @@
 use std::sync::Arc;
 
-use tagalong_config::Registry;
 use tagalong_core::DepthImage;
 use tagalong_eval::{Clear, Comparison, Frame, Region, Report, Similarity, Truth};
 use tagalong_geometry::{Camera, Pinhole};
@@ -13,8 +12,7 @@ const PERSON: Rect = Rect::new(100.0, 100.0, 60.0, 60.0);
 const AT: [f64; 4] = [102.0, 101.0, 58.0, 58.0];
 
 fn remedies() -> Remedies {
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong_catalog::registry();
     Remedies::new(&registry)
 }
 

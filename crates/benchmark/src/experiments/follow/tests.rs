@@ -19,8 +19,7 @@ fn scene(block: &str) -> Scene {
 }
 
 fn ridden(block: &str, is_told: bool) -> Ridden {
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong_catalog::registry();
     let config = "[[detectors]]\nplugin = \"depth-template\"\nroles = [\"track\", \"discover\"]\n\
         [filter]\nplugin = \"ekf\"\n[controller]\nplugin = \"clear-follow\"\n";
     let seeing = Contender::new("follow", config);
@@ -53,8 +52,7 @@ fn each_pipeline_is_told_beside_seeing() {
 /// The name of each job's pipeline, and whether it is told, with these further arguments.
 fn jobs_with(more: &[&str]) -> Vec<(String, bool)> {
     let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/follow-depth.toml");
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong_catalog::registry();
     let line = ["follow", config.to_str().expect("UTF-8"), "among-circular", "--seeds", "2"];
     let args = Cli::parse_from(line.iter().chain(more)).follow;
     let seeds = args.split.seeds(0, args.seeds).expect("enough seeds");
@@ -64,8 +62,7 @@ fn jobs_with(more: &[&str]) -> Vec<(String, bool)> {
 
 #[test]
 fn a_source_of_obstacles_that_the_scene_lacks_is_named_before_the_ride() {
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong_catalog::registry();
     let config = "[[detectors]]\nplugin = \"depth-template\"\nroles = [\"track\", \"discover\"]\n\
         [filter]\nplugin = \"ekf\"\n[controller]\nplugin = \"clear-follow\"\n\
         [[collision_monitor.sources]]\nname = \"hazards\"\ntype = \"bumper\"\n";
@@ -83,8 +80,7 @@ fn a_source_of_obstacles_that_the_scene_lacks_is_named_before_the_ride() {
 
 /// Returns the refusal of an argument line, whose paths are those of a clone.
 fn refusal(line: &[&str]) -> String {
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let registry = tagalong_catalog::registry();
     let args = Cli::parse_from(std::iter::once(&"follow").chain(line)).follow;
     let seeds = args.split.seeds(0, args.seeds).unwrap();
     match jobs(&args, seeds, &registry) {

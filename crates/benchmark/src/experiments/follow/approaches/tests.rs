@@ -27,8 +27,7 @@ impl Controller for Standing {
 }
 
 fn registry() -> Registry {
-    let mut registry = Registry::default();
-    tagalong_catalog::register(&mut registry);
+    let mut registry = tagalong_catalog::registry();
     registry.controller("stands", "stands", |_: Unset, _| Ok(Standing));
     registry
 }
