@@ -481,7 +481,14 @@ pub fn planned_for_tests(pipeline: &str) -> Task {
         log_name: "hall".into(),
         log: "logs/hall.mcap".into(),
         truth: "logs/hall.people.csv".into(),
-        ..Task::default()
+        whole_bodies: false,
+        drops_doubled_ids: false,
+        seed: 0,
+        inputs: BTreeMap::new(),
+        copy_of: None,
+        made_with_log: false,
+        version: String::new(),
+        skip: None,
     }
 }
 
