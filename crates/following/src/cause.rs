@@ -23,6 +23,8 @@ pub enum Cause {
         /// True if the stop lasts until a person has checked the robot and resets it.
         needs_reset: bool,
     },
+    /// The fault that was latched first, which holds until the robot is armed again.
+    Fault(&'static str),
 }
 
 /// Place that limits the speed.
@@ -42,13 +44,17 @@ pub struct PlaceCause {
 
 impl Cause {
     /// Finds the cause of a reason: among the allowances that were asked for, in their order, or
-    /// among the sensors.
+    /// among the sensors, or the latched fault.
     pub(crate) fn of(
         reason: Reason,
+        fault: Option<&'static str>,
         asked: &[Allowance],
         monitor: &CollisionMonitor,
         tracks: &[Track],
     ) -> Option<Self> {
+        if reason == Reason::Fault {
+            return fault.map(Self::Fault);
+        }
         if reason == Reason::Frozen {
             let (name, needs_reset) = monitor.frozen_sensor()?;
             return Some(Self::Sensor { name, needs_reset });
@@ -99,6 +105,7 @@ impl fmt::Display for Cause {
             Self::Sensor { name, needs_reset: false } => {
                 write!(f, "{name}; the robot stands until it delivers new readings")
             }
+            Self::Fault(why) => f.write_str(why),
         }
     }
 }

@@ -47,7 +47,7 @@ pub struct Steered {
     pub target: Option<TrackId>,
     /// The state of the target lock.
     pub lock: LockReport,
-    /// Cause of the reason of the command, where a place or a frozen sensor is one.
+    /// Cause of the reason of the command, where a place, a frozen sensor or a fault is one.
     pub cause: Option<Cause>,
     /// Places that the collision monitor counted.
     pub obstacles: Vec<ObstaclePoint>,
@@ -205,7 +205,7 @@ impl Steering {
             asked.push(allowed);
             allowed
         });
-        let cause = Cause::of(command.reason, &asked, &self.monitor, tracks);
+        let cause = Cause::of(command.reason, self.fault(), &asked, &self.monitor, tracks);
         // The search learns only now that its wish was blocked; it reacts in the next frame.
         let is_blocked =
             matches!(command.reason, Reason::Blocked | Reason::TooClose | Reason::Unknown);

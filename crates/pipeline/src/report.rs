@@ -35,7 +35,7 @@ pub struct FrameReport {
     /// Command for the wheels with its reason, where the pipeline has a controller: its wish within
     /// all limits, zero without a target.
     pub command: Option<Command>,
-    /// Cause of the command's reason, where a place or a frozen sensor is one.
+    /// Cause of the command's reason, where a place, a frozen sensor or a fault is one.
     pub cause: Option<Cause>,
     /// Places that the collision monitor counts as obstacles, where the pipeline has a controller;
     /// those of the followed person are left out.

@@ -259,24 +259,33 @@ impl CollisionMonitor {
         self.zones.stop_reason()
     }
 
-    /// Returns the first sensor that is frozen, by name, and true if that lasts until the robot is armed
+    /// Returns the sensor that is frozen, by name, and true if that lasts until the robot is armed
     /// again.
     pub(crate) fn frozen_sensor(&self) -> Option<(String, bool)> {
+        // One that only repeats itself is free again with the next reading, and hides no other.
+        if let Some(name) = self.first_frozen(0) {
+            return Some((name, true));
+        }
         let most = if self.settings.noiseless { 0 } else { self.settings.identical_frames };
-        // A sensor that only repeats itself is free again with the next reading.
+        self.first_frozen(most).map(|name| (name, false))
+    }
+
+    /// Returns the name of the first sensor that contradicted the odometry or, where `most` is not 0,
+    /// repeated itself so many times.
+    fn first_frozen(&self, most: u32) -> Option<String> {
         if self.depth.is_frozen(most) {
-            return Some(("the depth image".to_owned(), self.depth.is_frozen(0)));
+            return Some("the depth image".to_owned());
         }
         if self.laser.is_frozen(most) {
-            return Some(("the laser scanner".to_owned(), self.laser.is_frozen(0)));
+            return Some("the laser scanner".to_owned());
         }
         for (place, (laser, _)) in self.further_lasers.iter().enumerate() {
             if laser.is_frozen(most) {
-                return Some((format!("laser scanner {}", place + 2), laser.is_frozen(0)));
+                return Some(format!("laser scanner {}", place + 2));
             }
         }
         let source = self.sources.iter().find(|source| source.is_frozen(most))?;
-        Some((format!("the source `{}`", source.name()), source.is_frozen(0)))
+        Some(format!("the source `{}`", source.name()))
     }
 
     /// Returns the nearest place inside the polygon that this reason comes from, with its distance from

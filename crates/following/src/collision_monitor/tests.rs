@@ -120,6 +120,25 @@ fn the_same_depth_image_again_is_frozen_and_a_noisy_one_is_not() {
 }
 
 #[test]
+fn a_sensor_that_needs_a_reset_is_named_before_one_that_repeats_itself() {
+    let mut monitor = monitor();
+    let mut named = Vec::new();
+    for index in 0..30 {
+        let steps = index.min(20) as f64;
+        let forward = if index <= 20 { 0.05 } else { 0.0 };
+        let motion = EgoMotion { forward, ..EgoMotion::at_rest(0.1) };
+        // The scan stays the same but for its noise; the depth image repeats itself at the end.
+        let depth = depth_at(index.min(20), 0.05 * steps, 0.0);
+        let scan = scan_at(index, 0.0, 0.0, |_| None);
+        let frame = frame(index, motion, Some(depth), Some(scan));
+        monitor.update(&frame, &motion, &[], None);
+        named.push(monitor.frozen_sensor());
+    }
+    let laser = Some(("the laser scanner".to_owned(), true));
+    assert_eq!((&named[20], &named[29]), (&laser, &laser));
+}
+
+#[test]
 fn a_simulator_without_noise_may_say_so() {
     let settings =
         CollisionMonitorSettings { noiseless: true, ..CollisionMonitorSettings::default() };
