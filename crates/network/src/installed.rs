@@ -117,7 +117,8 @@ mod tests {
             let program = std::env::current_exe().expect("the path of the tests");
             let mut again = std::process::Command::new(program);
             again.args(["--exact", TEST]).env(DATA_FOLDER, folder.path()).env(IS_INSIDE, "");
-            assert!(again.status().expect("the tests run").success());
+            let ran = again.output().expect("the tests run");
+            assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stdout));
             return;
         }
         let networks = networks_folder().expect("the folder that is set");

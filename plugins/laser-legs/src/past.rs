@@ -223,4 +223,15 @@ mod tests {
         let between = Rotation2::new(0.075) * Point2::new(3.9, 0.0);
         assert_eq!(past.was_free(&between), 0.0);
     }
+
+    #[test]
+    fn the_last_scans_are_kept() {
+        let mut past = PastScans::default();
+        for number in 1..=KEPT + 3 {
+            past.add(&beams(&[[3.0, 0.0]]), Vector2::new(number as f64, 0.0));
+            assert_eq!(past.scans.len(), number.min(KEPT));
+        }
+        let first = past.scans.front().map(|scan| scan.now_from_then.translation.x);
+        assert_eq!(first, Some(4.0), "the oldest is left out");
+    }
 }

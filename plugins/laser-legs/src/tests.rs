@@ -330,6 +330,15 @@ fn each_feature_is_that_of_its_definition() {
     assert_features(&last, &[("larger_jump", 0.5), ("smaller_jump", 0.08_f64.sqrt())]);
 }
 
+#[test]
+fn what_is_exactly_as_far_hides_nothing() {
+    let beams = reflections(&[(0, [2.0, -0.5]), (1, [2.0, 0.5]), (2, [2.0, 0.25])]);
+    for (middle, occluded) in [(0..1, 0.0), (1..2, 1.0), (2..3, 0.0)] {
+        let found = features(&beams, &middle, &[0..1, 1..2, 2..3]);
+        assert_features(&found, &[("occluded_sides", occluded)]);
+    }
+}
+
 /// Four points that lie on no circle, by the normal equations.
 #[test]
 fn the_circle_is_that_of_least_squares() {

@@ -323,6 +323,24 @@ mod tests {
         }
     }
 
+    /// Two targets of one input leave an error of 1, of which the first step can take a millionth.
+    #[test]
+    fn after_a_step_that_gains_too_little_there_is_no_other() {
+        let start = Network {
+            mean: vec![0.0],
+            scale: vec![1.0],
+            target: [0.0, 1.0],
+            hidden: vec![vec![0.5, -0.25]],
+            output: vec![2.0, 1e-3 - 2.0 * 0.25_f64.tanh()],
+        };
+        let [one, nine] = [1, 9].map(|steps| {
+            let fit = Fit { decay: 0.0, steps, ..FIT };
+            fit.descend(start.clone(), &[vec![1.0], vec![1.0]], &[1.0, -1.0]).1
+        });
+        assert!(one.answer(&[1.0]).abs() < 1e-4, "the step is made");
+        assert_eq!(one, nine);
+    }
+
     /// Without an error there is the decay alone: 0.8 for two samples and four weights.
     #[test]
     fn a_step_without_errors_makes_the_weights_smaller() {

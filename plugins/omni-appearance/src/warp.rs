@@ -351,6 +351,34 @@ mod tests {
         }
     }
 
+    /// Half a column to the right and a quarter of a row down, in an image of 8 by 4 pixels.
+    #[test]
+    fn a_pixel_is_the_mean_of_four_around_its_place_also_across_the_seam() {
+        /// Returns the mean of a colour of two pixels side by side.
+        fn both(image: &[f32], row: usize, column: usize, colour: usize) -> f32 {
+            let sum: f32 =
+                [column, (column + 1) % 8].map(|x| image[24 * row + 3 * x + colour]).iter().sum();
+            0.5 * sum
+        }
+
+        let places =
+            [[0.5, 0.25], [8.5, 0.25], [16.5, 0.25], [0.5, 8.25], [8.5, 8.25], [16.5, 8.25]];
+        let warp = Warp { columns: 8, rows: 4, nodes: places.into(), across: 3 };
+        let image: Vec<f32> = (0..8 * 4 * 3).map(|at| (37 * at % 101) as f32).collect();
+        let mut moved = vec![0.0; image.len()];
+        warp.apply(&image, &mut moved);
+        for (at, found) in moved.iter().enumerate() {
+            let row = at / 24;
+            let column = at % 24 / 3;
+            // Below the last row there is none: it stays where it is.
+            let down = if row == 3 { 0.0 } else { 0.25 };
+            let upper = both(&image, row, column, at % 3);
+            let lower = both(&image, (row + 1).min(3), column, at % 3);
+            let expected = upper + down * (lower - upper);
+            assert!((found - expected).abs() < 1e-4, "{row} {column}: {found} {expected}");
+        }
+    }
+
     #[test]
     fn a_wall_is_found_at_its_distance() {
         let camera = camera();
