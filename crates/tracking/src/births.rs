@@ -117,7 +117,7 @@ fn births_per_m2(detection: &Detection, camera: &Camera, settings: &BirthSetting
 mod tests {
     use nalgebra::{Matrix3, Point3, SMatrix, Vector2, Vector3};
     use tagalong_core::{Person, TrackId};
-    use tagalong_geometry::{ImageBox, Pinhole, Rect};
+    use tagalong_geometry::{Distortion, ImageBox, Pinhole, Rect};
 
     use super::*;
 
@@ -129,7 +129,9 @@ mod tests {
     };
 
     fn camera() -> Camera {
-        Camera::mounted(Pinhole::centred(500.0, 640, 480), 640, 480, 1.2, 0.0, 0.0)
+        let lens =
+            Pinhole { fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5, distortion: Distortion::None };
+        Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0)
     }
 
     /// Detection 3 m ahead, with a box at this place in the image.
