@@ -1,96 +1,98 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Error, Result};
+use tagalong_core::{Error, Result, settings};
 
 use super::SourceSettings;
 use crate::command_limiter::at_least;
 use crate::{CommandLimiterSettings, RobotSettings};
 
-/// Obstacles and people before which the robot slows down and stops.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-#[non_exhaustive]
-pub struct CollisionMonitorSettings {
-    /// Sensors of obstacles: "sensed" (depth or laser; without them, or when one of them falls
-    /// silent, nothing moves), or "none" for a controller that is to drive without eyes for
-    /// obstacles.
-    pub obstacles: ObstacleSource,
-    /// Clearance beside the footprint, m: a thing that is nearer to the swept area is in the way.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub side_m: f64,
-    /// Distance of the footprint from an obstacle at which the robot stops before it, m.
-    #[schemars(range(min = 0.15, max = 2.0))]
-    pub stop_m: f64,
-    /// Stop polygon: corners `[x, y]` in the robot frame, m. While `min_points` readings are inside,
-    /// the robot neither drives nor turns. Left out, there is none.
-    pub stop: Vec<[f64; 2]>,
-    /// Slowdown polygon, in the same form: while `min_points` readings are inside, the robot drives and
-    /// turns at `slowdown_ratio` of its speed.
-    pub slowdown: Vec<[f64; 2]>,
-    /// Factor of the speed while something is inside `slowdown`.
-    #[schemars(range(min = 0.05, max = 1.0))]
-    pub slowdown_ratio: f64,
-    /// Keeps away from people, and from things that move, so far that the robot stands before they
-    /// can reach it; see `people_mps`.
-    pub separation: bool,
-    /// Speed of an approaching person, m/s (1.6 in ISO 13855).
-    #[schemars(range(min = 0.5, max = 2.5))]
-    pub people_mps: f64,
-    /// Acceleration with which a person may begin to come nearer, m/s².
-    #[schemars(range(min = 0.5, max = 10.0))]
-    pub people_accel_mps2: f64,
-    /// Distance that is left between the footprint and a person when the robot stands, m.
-    #[schemars(range(min = 0.05, max = 2.0))]
-    pub protective_m: f64,
-    /// Distance of the footprint from the followed person at which the robot stops, m.
-    #[schemars(range(min = 0.1, max = 2.0))]
-    pub followed_stop_m: f64,
-    /// Distance beyond which people and things that move are ignored, m.
-    #[schemars(range(min = 1.0, max = 10.0))]
-    pub people_range_m: f64,
-    /// Distance beyond which obstacles are ignored, m.
-    #[schemars(range(min = 0.5, max = 10.0))]
-    pub range_m: f64,
-    /// Height up to which points belong to the floor, m; it grows by 3 cm for each metre of
-    /// distance.
-    #[schemars(range(min = 0.02, max = 0.2))]
-    pub floor_m: f64,
-    /// Depth below the floor from which on there is a fall (a stair, a kerb), m; it grows by 3 cm
-    /// for each metre of distance.
-    #[schemars(range(min = 0.04, max = 0.3))]
-    pub drop_m: f64,
-    /// Height above which points are ignored because the robot passes below, m.
-    #[schemars(range(min = 0.3, max = 3.0))]
-    pub top_m: f64,
-    /// Radius around the target within which points belong to it, m.
-    #[schemars(range(min = 0.0, max = 0.8))]
-    pub target_radius_m: f64,
-    /// Number of points that make an obstacle, in a grid of 160 columns over the image.
-    #[schemars(range(min = 1, max = 100))]
-    pub min_points: u32,
-    /// Part of the image with depth below which the camera counts as blind.
-    #[schemars(range(min = 0.005, max = 1.0))]
-    pub min_seen: f64,
-    /// Least share of valid readings of a sensor in the part of the swept region that it sees; the
-    /// robot is slower below twice this share, and stands below it.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub min_share: f64,
-    /// Meaning of a laser ray from which nothing came back: "unknown" unless a camera sees the same
-    /// region, or "free" for a scanner that misses nothing within its range, alone in rooms that are
-    /// larger than that.
-    pub no_return: NoReturn,
-    /// Number of new depth images or scans in a row that repeat the one before, after which the sensor
-    /// counts as frozen: real ones have noise. One that comes with several frames is new once.
-    #[schemars(range(min = 2, max = 100))]
-    pub identical_frames: u32,
-    /// The sensors are simulated without noise: equal images are not taken to be frozen.
-    pub noiseless: bool,
-    /// Time for which an obstacle is remembered that left the view beside the robot or below the
-    /// image, s.
-    #[schemars(range(min = 1.0, max = 600.0))]
-    pub memory_s: f64,
-    /// Further sources of obstacles: laser scanners, depth cameras, range sensors and bumpers.
-    pub sources: Vec<SourceSettings>,
+settings! {
+    /// Obstacles and people before which the robot slows down and stops.
+    #[non_exhaustive]
+    pub struct CollisionMonitorSettings {
+        /// Sensors of obstacles: "sensed" (depth or laser; without them, or when one of them falls
+        /// silent, nothing moves), or "none" for a controller that is to drive without eyes for
+        /// obstacles.
+        pub obstacles: ObstacleSource = ObstacleSource::Sensed,
+        /// Clearance beside the footprint, m: a thing that is nearer to the swept area is in the
+        /// way.
+        #[schemars(range(min = 0.0, max = 1.0))]
+        pub side_m: f64 = 0.09,
+        /// Distance of the footprint from an obstacle at which the robot stops before it, m.
+        #[schemars(range(min = 0.15, max = 2.0))]
+        pub stop_m: f64 = 0.35,
+        /// Stop polygon: corners `[x, y]` in the robot frame, m. While `min_points` readings are
+        /// inside, the robot neither drives nor turns. Left out, there is none.
+        pub stop: Vec<[f64; 2]>,
+        /// Slowdown polygon, in the same form: while `min_points` readings are inside, the robot
+        /// drives and turns at `slowdown_ratio` of its speed.
+        pub slowdown: Vec<[f64; 2]>,
+        /// Factor of the speed while something is inside `slowdown`.
+        #[schemars(range(min = 0.05, max = 1.0))]
+        pub slowdown_ratio: f64 = 0.5,
+        /// Keeps away from people, and from things that move, so far that the robot stands before
+        /// they can reach it; see `people_mps`.
+        pub separation: bool = true,
+        /// Speed of an approaching person, m/s (1.6 in ISO 13855).
+        #[schemars(range(min = 0.5, max = 2.5))]
+        pub people_mps: f64 = 1.6,
+        /// Acceleration with which a person may begin to come nearer, m/s².
+        #[schemars(range(min = 0.5, max = 10.0))]
+        pub people_accel_mps2: f64 = 2.0,
+        /// Distance that is left between the footprint and a person when the robot stands, m.
+        #[schemars(range(min = 0.05, max = 2.0))]
+        pub protective_m: f64 = 0.2,
+        /// Distance of the footprint from the followed person at which the robot stops, m.
+        #[schemars(range(min = 0.1, max = 2.0))]
+        pub followed_stop_m: f64 = 0.3,
+        /// Distance beyond which people and things that move are ignored, m.
+        #[schemars(range(min = 1.0, max = 10.0))]
+        pub people_range_m: f64 = 5.0,
+        /// Distance beyond which obstacles are ignored, m.
+        #[schemars(range(min = 0.5, max = 10.0))]
+        pub range_m: f64 = 3.0,
+        /// Height up to which points belong to the floor, m; it grows by 3 cm for each metre of
+        /// distance.
+        #[schemars(range(min = 0.02, max = 0.2))]
+        pub floor_m: f64 = 0.08,
+        /// Depth below the floor from which on there is a fall (a stair, a kerb), m; it grows by 3
+        /// cm for each metre of distance.
+        #[schemars(range(min = 0.04, max = 0.3))]
+        pub drop_m: f64 = 0.08,
+        /// Height above which points are ignored because the robot passes below, m.
+        #[schemars(range(min = 0.3, max = 3.0))]
+        pub top_m: f64 = 1.5,
+        /// Radius around the target within which points belong to it, m.
+        #[schemars(range(min = 0.0, max = 0.8))]
+        pub target_radius_m: f64 = 0.45,
+        /// Number of points that make an obstacle, in a grid of 160 columns over the image.
+        #[schemars(range(min = 1, max = 100))]
+        pub min_points: u32 = 6,
+        /// Part of the image with depth below which the camera counts as blind.
+        #[schemars(range(min = 0.005, max = 1.0))]
+        pub min_seen: f64 = 0.02,
+        /// Least share of valid readings of a sensor in the part of the swept region that it sees;
+        /// the robot is slower below twice this share, and stands below it.
+        #[schemars(range(min = 0.0, max = 1.0))]
+        pub min_share: f64 = 0.3,
+        /// Meaning of a laser ray from which nothing came back: "unknown" unless a camera sees the
+        /// same region, or "free" for a scanner that misses nothing within its range, alone in
+        /// rooms that are larger than that.
+        pub no_return: NoReturn = NoReturn::Unknown,
+        /// Number of new depth images or scans in a row that repeat the one before, after which the
+        /// sensor counts as frozen: real ones have noise. One that comes with several frames is new
+        /// once.
+        #[schemars(range(min = 2, max = 100))]
+        pub identical_frames: u32 = 4,
+        /// The sensors are simulated without noise: equal images are not taken to be frozen.
+        pub noiseless: bool = false,
+        /// Time for which an obstacle is remembered that left the view beside the robot or below
+        /// the image, s.
+        #[schemars(range(min = 1.0, max = 600.0))]
+        pub memory_s: f64 = 20.0,
+        /// Further sources of obstacles: laser scanners, depth cameras, range sensors and bumpers.
+        pub sources: Vec<SourceSettings>,
+    }
 }
 
 /// Meaning of a laser ray without a reflection.
@@ -115,38 +117,6 @@ pub enum ObstacleSource {
     Sensed,
     /// The robot moves without sensors of obstacles.
     None,
-}
-
-impl Default for CollisionMonitorSettings {
-    fn default() -> Self {
-        Self {
-            obstacles: ObstacleSource::Sensed,
-            side_m: 0.09,
-            stop_m: 0.35,
-            stop: Vec::new(),
-            slowdown: Vec::new(),
-            slowdown_ratio: 0.5,
-            separation: true,
-            people_mps: 1.6,
-            people_accel_mps2: 2.0,
-            protective_m: 0.2,
-            followed_stop_m: 0.3,
-            people_range_m: 5.0,
-            range_m: 3.0,
-            floor_m: 0.08,
-            drop_m: 0.08,
-            top_m: 1.5,
-            target_radius_m: 0.45,
-            min_points: 6,
-            min_seen: 0.02,
-            min_share: 0.3,
-            no_return: NoReturn::Unknown,
-            identical_frames: 4,
-            noiseless: false,
-            memory_s: 20.0,
-            sources: Vec::new(),
-        }
-    }
 }
 
 impl CollisionMonitorSettings {

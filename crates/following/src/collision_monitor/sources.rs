@@ -1,34 +1,35 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tagalong_core::{Error, Result};
+use tagalong_core::{Error, Result, settings};
 
-/// Further source of obstacles: a `[[collision_monitor.sources]]` section, as an entry of
-/// `observation_sources` of Nav2's collision monitor. The depth image and the laser scan of the frames
-/// are sources without a section.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-#[non_exhaustive]
-pub struct SourceSettings {
-    /// Name of the source in reports; each has its own.
-    pub name: String,
-    /// Kind of the sensor: "scan", "depth", "range" (sonar, infrared) or "bumper".
-    #[serde(rename = "type")]
-    pub kind: SourceKind,
-    /// Topic of its messages. Left out, only programs that fill the frames themselves deliver it.
-    pub topic: String,
-    /// Topic of the calibration of a depth camera; left out, it is found beside `topic`.
-    pub info_topic: String,
-    /// Pose of the sensor in the robot frame: x, y, z in m, roll, pitch, yaw in degrees; it looks along
-    /// its x axis, a camera too. Left out, that of tf.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mount: Option<[f64; 6]>,
-    /// Age of its newest reading above which the robot stops, s (Nav2's `source_timeout`).
-    #[schemars(range(min = 0.05, max = 5.0))]
-    pub source_timeout_s: f64,
-    /// Least share of valid readings in the part of the swept region that the source sees; below it
-    /// the robot stops.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub min_share: f64,
+settings! {
+    /// Further source of obstacles: a `[[collision_monitor.sources]]` section, as an entry of
+    /// `observation_sources` of Nav2's collision monitor. The depth image and the laser scan of the
+    /// frames are sources without a section.
+    #[non_exhaustive]
+    pub struct SourceSettings {
+        /// Name of the source in reports; each has its own.
+        pub name: String,
+        /// Kind of the sensor: "scan", "depth", "range" (sonar, infrared) or "bumper".
+        #[serde(rename = "type")]
+        pub kind: SourceKind = SourceKind::Scan,
+        /// Topic of its messages. Left out, only programs that fill the frames themselves deliver
+        /// it.
+        pub topic: String,
+        /// Topic of the calibration of a depth camera; left out, it is found beside `topic`.
+        pub info_topic: String,
+        /// Pose of the sensor in the robot frame: x, y, z in m, roll, pitch, yaw in degrees; it
+        /// looks along its x axis, a camera too. Left out, that of tf.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub mount: Option<[f64; 6]>,
+        /// Age of its newest reading above which the robot stops, s (Nav2's `source_timeout`).
+        #[schemars(range(min = 0.05, max = 5.0))]
+        pub source_timeout_s: f64 = 0.5,
+        /// Least share of valid readings in the part of the swept region that the source sees;
+        /// below it the robot stops.
+        #[schemars(range(min = 0.0, max = 1.0))]
+        pub min_share: f64 = 0.3,
+    }
 }
 
 /// Kind of a source of obstacles.
@@ -44,20 +45,6 @@ pub enum SourceKind {
     Range,
     /// A contact message: `std_msgs/Bool`, or that of a common base.
     Bumper,
-}
-
-impl Default for SourceSettings {
-    fn default() -> Self {
-        Self {
-            name: String::new(),
-            kind: SourceKind::Scan,
-            topic: String::new(),
-            info_topic: String::new(),
-            mount: None,
-            source_timeout_s: 0.5,
-            min_share: 0.3,
-        }
-    }
 }
 
 impl SourceSettings {

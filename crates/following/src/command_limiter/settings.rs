@@ -1,90 +1,65 @@
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-use tagalong_core::{Error, Result};
+use tagalong_core::{Error, Result, settings};
 
 use crate::RobotSettings;
 use crate::collision_monitor::Braking;
 
-/// Limits on the robot's motion, for any wish of the controller. The figures are those that makers
-/// and users of mobile robots work with, and each has a ceiling that no config passes; this is no
-/// safety function in the sense of the standards.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-#[non_exhaustive]
-pub struct CommandLimiterSettings {
-    /// Largest acceleration, m/s².
-    #[schemars(range(min = 0.05, max = 1.0))]
-    pub max_accel_mps2: f64,
-    /// Largest deceleration, m/s²; only an emergency brakes harder.
-    #[schemars(range(min = 0.2, max = 2.5))]
-    pub max_decel_mps2: f64,
-    /// Largest turn rate, rad/s.
-    #[schemars(range(min = 0.1, max = 2.0))]
-    pub max_turn_radps: f64,
-    /// Largest change of the turn rate, rad/s².
-    #[schemars(range(min = 0.5, max = 10.0))]
-    pub max_turn_accel_radps2: f64,
-    /// Largest change of the acceleration, m/s³; only an emergency changes it faster.
-    #[schemars(range(min = 1.0, max = 50.0))]
-    pub max_jerk_mps3: f64,
-    /// Largest change of the acceleration of the turn, rad/s³.
-    #[schemars(range(min = 5.0, max = 500.0))]
-    pub max_turn_jerk_radps3: f64,
-    /// The robot may drive backwards, where no camera looks.
-    pub reverse: bool,
-    /// Delay from an image to wheels that move accordingly, s; part of the stopping distance. At
-    /// least `valid_s`, because the robot drives on for that time when images cease.
-    #[schemars(range(min = 0.1, max = 2.0))]
-    pub reaction_s: f64,
-    /// Time from the end of the braking until the wheels stand, s: a person comes nearer meanwhile.
-    /// Bases with a slow motor control take some tenths of a second.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub settle_s: f64,
-    /// Distance that is left when the robot has stopped, m.
-    #[schemars(range(min = 0.3, max = 2.0))]
-    pub margin_m: f64,
-    /// Validity of a command, s.
-    #[schemars(range(min = 0.05, max = 0.5))]
-    pub valid_s: f64,
-    /// Pause between frames after which the speed is halved, s.
-    #[schemars(range(min = 0.05, max = 0.5))]
-    pub slow_after_s: f64,
-    /// Pause between frames after which the robot stops, s.
-    #[schemars(range(min = 0.1, max = 0.5))]
-    pub stop_after_s: f64,
-    /// Largest believable speed of the odometry, m/s; more is a fault until the pipeline is armed
-    /// again.
-    #[schemars(range(min = 0.1, max = 5.0))]
-    pub max_odometry_mps: f64,
-    /// Compares the commands with the odometry while the base executes them: a base that does something
-    /// else, or responds too late, is a fault. Off only where the odometry is not that of the base, as
-    /// in a test with a recorded drive.
-    pub check_response: bool,
-    /// Time for which an enable holds unless it is repeated, s.
-    #[schemars(range(min = 0.1, max = 1.0))]
-    pub enable_s: f64,
-}
-
-impl Default for CommandLimiterSettings {
-    fn default() -> Self {
-        Self {
-            max_accel_mps2: 0.5,
-            max_decel_mps2: 1.0,
-            max_turn_radps: 1.5,
-            max_turn_accel_radps2: 4.0,
-            max_jerk_mps3: 5.0,
-            max_turn_jerk_radps3: 40.0,
-            reverse: false,
-            reaction_s: 0.5,
-            settle_s: 0.25,
-            margin_m: 0.3,
-            valid_s: 0.25,
-            slow_after_s: 0.25,
-            stop_after_s: 0.5,
-            max_odometry_mps: 3.0,
-            check_response: true,
-            enable_s: 0.5,
-        }
+settings! {
+    /// Limits on the robot's motion, for any wish of the controller. The figures are those that
+    /// makers and users of mobile robots work with, and each has a ceiling that no config passes;
+    /// this is no safety function in the sense of the standards.
+    #[non_exhaustive]
+    pub struct CommandLimiterSettings {
+        /// Largest acceleration, m/s².
+        #[schemars(range(min = 0.05, max = 1.0))]
+        pub max_accel_mps2: f64 = 0.5,
+        /// Largest deceleration, m/s²; only an emergency brakes harder.
+        #[schemars(range(min = 0.2, max = 2.5))]
+        pub max_decel_mps2: f64 = 1.0,
+        /// Largest turn rate, rad/s.
+        #[schemars(range(min = 0.1, max = 2.0))]
+        pub max_turn_radps: f64 = 1.5,
+        /// Largest change of the turn rate, rad/s².
+        #[schemars(range(min = 0.5, max = 10.0))]
+        pub max_turn_accel_radps2: f64 = 4.0,
+        /// Largest change of the acceleration, m/s³; only an emergency changes it faster.
+        #[schemars(range(min = 1.0, max = 50.0))]
+        pub max_jerk_mps3: f64 = 5.0,
+        /// Largest change of the acceleration of the turn, rad/s³.
+        #[schemars(range(min = 5.0, max = 500.0))]
+        pub max_turn_jerk_radps3: f64 = 40.0,
+        /// The robot may drive backwards, where no camera looks.
+        pub reverse: bool = false,
+        /// Delay from an image to wheels that move accordingly, s; part of the stopping distance.
+        /// At least `valid_s`, because the robot drives on for that time when images cease.
+        #[schemars(range(min = 0.1, max = 2.0))]
+        pub reaction_s: f64 = 0.5,
+        /// Time from the end of the braking until the wheels stand, s: a person comes nearer
+        /// meanwhile. Bases with a slow motor control take some tenths of a second.
+        #[schemars(range(min = 0.0, max = 1.0))]
+        pub settle_s: f64 = 0.25,
+        /// Distance that is left when the robot has stopped, m.
+        #[schemars(range(min = 0.3, max = 2.0))]
+        pub margin_m: f64 = 0.3,
+        /// Validity of a command, s.
+        #[schemars(range(min = 0.05, max = 0.5))]
+        pub valid_s: f64 = 0.25,
+        /// Pause between frames after which the speed is halved, s.
+        #[schemars(range(min = 0.05, max = 0.5))]
+        pub slow_after_s: f64 = 0.25,
+        /// Pause between frames after which the robot stops, s.
+        #[schemars(range(min = 0.1, max = 0.5))]
+        pub stop_after_s: f64 = 0.5,
+        /// Largest believable speed of the odometry, m/s; more is a fault until the pipeline is
+        /// armed again.
+        #[schemars(range(min = 0.1, max = 5.0))]
+        pub max_odometry_mps: f64 = 3.0,
+        /// Compares the commands with the odometry while the base executes them: a base that does
+        /// something else, or responds too late, is a fault. Off only where the odometry is not
+        /// that of the base, as in a test with a recorded drive.
+        pub check_response: bool = true,
+        /// Time for which an enable holds unless it is repeated, s.
+        #[schemars(range(min = 0.1, max = 1.0))]
+        pub enable_s: f64 = 0.5,
     }
 }
 

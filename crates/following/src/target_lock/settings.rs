@@ -1,144 +1,115 @@
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-use tagalong_core::{Error, Result};
+use tagalong_core::{Error, Result, settings};
 
 use super::ChoiceRule;
 
-/// Choice of the target, doubts about its identity, and the search for a lost person.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-#[non_exhaustive]
-pub struct TargetSettings {
-    /// Number of the track to follow; one that `choose` picks if left out.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub track: Option<u32>,
-    /// Choice of a person while there is none: "nearest" in front; "approach", the one that walks up to
-    /// the robot and stands still before it; "raised-hand", the one that holds a hand above the head,
-    /// with a detector that finds joints; or "none", to wait for an enrollment.
-    pub choose: ChoiceRule,
-    /// Largest bearing to either side of a track that may be chosen, degrees.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub choose_within_deg: f64,
-    /// Largest distance of a track that may be chosen, m.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub choose_within_m: f64,
-    /// Time for which there has been such a track before one is chosen, s: the nearest person is
-    /// not always seen first.
-    #[schemars(range(min = 0.0))]
-    pub choose_after_s: f64,
-    /// Time after that choice in which somebody nearer, at most 3 m away and within the same bearing,
-    /// is taken instead, s. An enrolled person is kept in any case.
-    #[schemars(range(min = 0.0, max = 10.0))]
-    pub reconsider_s: f64,
-    /// Distance within which a person that walked up to the robot stands before it, m.
-    #[schemars(range(min = 0.5, max = 5.0))]
-    pub approach_within_m: f64,
-    /// Distance by which that person came nearer, m.
-    #[schemars(range(min = 0.1, max = 5.0))]
-    pub approach_by_m: f64,
-    /// Time for which that person stands still, s.
-    #[schemars(range(min = 0.2, max = 30.0))]
-    pub approach_stands_s: f64,
-    /// Time for which a person holds a hand above the head, s.
-    #[schemars(range(min = 0.2, max = 10.0))]
-    pub raised_hand_s: f64,
-    /// Remember the person's appearance, doubt a track that looks different, and recognise the
-    /// person again. Without it a track is followed while it lives, and no other after that.
-    pub remember: bool,
-    /// Number of detections after which the person is known well.
-    #[schemars(range(min = 1))]
-    pub training_sightings: u32,
-    /// Weight of one detection in the belief that it is the same person, 0 to 1.
-    #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 1))]
-    pub belief_weight: f64,
-    /// Probability of being the same person below which the track is followed slowly.
-    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
-    pub doubt_below: f64,
-    /// Probability of being the same person below which the target is lost.
-    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
-    pub refuse_below: f64,
-    /// Time out of sight after which the identity is doubted, s.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub doubt_after_s: f64,
-    /// Time out of sight after which the target is lost, s.
-    pub lose_after_s: f64,
-    /// Accumulated probability from which on a track is recognised as the person, ...
-    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
-    pub again_from: f64,
-    /// ... in this many detections in a row.
-    #[schemars(range(min = 1))]
-    pub again_sightings: u32,
-    /// Largest speed at which the person can have moved from the last seen position, m/s.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub reach_mps: f64,
-    /// Distance from the person below which another track may be confused with it, m: appearances
-    /// are compared, and nothing is learned.
-    #[schemars(range(min = 0.0))]
-    pub alone_m: f64,
-    /// Evidence from differences in appearance.
-    pub looks: LooksSettings,
-    /// Search for a lost person.
-    pub search: SearchSettings,
-}
-
-impl Default for TargetSettings {
-    fn default() -> Self {
-        Self {
-            track: None,
-            choose: ChoiceRule::Nearest,
-            choose_within_deg: 45.0,
-            choose_within_m: 5.0,
-            choose_after_s: 0.0,
-            reconsider_s: 0.0,
-            approach_within_m: 2.0,
-            approach_by_m: 0.5,
-            approach_stands_s: 1.0,
-            raised_hand_s: 0.6,
-            remember: true,
-            training_sightings: 15,
-            belief_weight: 0.25,
-            doubt_below: 0.4,
-            refuse_below: 0.15,
-            doubt_after_s: 0.5,
-            lose_after_s: 2.0,
-            again_from: 0.85,
-            again_sightings: 5,
-            reach_mps: 2.0,
-            alone_m: 0.8,
-            looks: LooksSettings::default(),
-            search: SearchSettings::default(),
-        }
+settings! {
+    /// Choice of the target, doubts about its identity, and the search for a lost person.
+    #[non_exhaustive]
+    pub struct TargetSettings {
+        /// Number of the track to follow; one that `choose` picks if left out.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub track: Option<u32>,
+        /// Choice of a person while there is none: "nearest" in front; "approach", the one that
+        /// walks up to the robot and stands still before it; "raised-hand", the one that holds a
+        /// hand above the head, with a detector that finds joints; or "none", to wait for an
+        /// enrollment.
+        pub choose: ChoiceRule = ChoiceRule::Nearest,
+        /// Largest bearing to either side of a track that may be chosen, degrees.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        pub choose_within_deg: f64 = 45.0,
+        /// Largest distance of a track that may be chosen, m.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        pub choose_within_m: f64 = 5.0,
+        /// Time for which there has been such a track before one is chosen, s: the nearest person
+        /// is not always seen first.
+        #[schemars(range(min = 0.0))]
+        pub choose_after_s: f64 = 0.0,
+        /// Time after that choice in which somebody nearer, at most 3 m away and within the same
+        /// bearing, is taken instead, s. An enrolled person is kept in any case.
+        #[schemars(range(min = 0.0, max = 10.0))]
+        pub reconsider_s: f64 = 0.0,
+        /// Distance within which a person that walked up to the robot stands before it, m.
+        #[schemars(range(min = 0.5, max = 5.0))]
+        pub approach_within_m: f64 = 2.0,
+        /// Distance by which that person came nearer, m.
+        #[schemars(range(min = 0.1, max = 5.0))]
+        pub approach_by_m: f64 = 0.5,
+        /// Time for which that person stands still, s.
+        #[schemars(range(min = 0.2, max = 30.0))]
+        pub approach_stands_s: f64 = 1.0,
+        /// Time for which a person holds a hand above the head, s.
+        #[schemars(range(min = 0.2, max = 10.0))]
+        pub raised_hand_s: f64 = 0.6,
+        /// Remember the person's appearance, doubt a track that looks different, and recognise the
+        /// person again. Without it a track is followed while it lives, and no other after that.
+        pub remember: bool = true,
+        /// Number of detections after which the person is known well.
+        #[schemars(range(min = 1))]
+        pub training_sightings: u32 = 15,
+        /// Weight of one detection in the belief that it is the same person, 0 to 1.
+        #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 1))]
+        pub belief_weight: f64 = 0.25,
+        /// Probability of being the same person below which the track is followed slowly.
+        #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
+        pub doubt_below: f64 = 0.4,
+        /// Probability of being the same person below which the target is lost.
+        #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
+        pub refuse_below: f64 = 0.15,
+        /// Time out of sight after which the identity is doubted, s.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        pub doubt_after_s: f64 = 0.5,
+        /// Time out of sight after which the target is lost, s.
+        pub lose_after_s: f64 = 2.0,
+        /// Accumulated probability from which on a track is recognised as the person, ...
+        #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
+        pub again_from: f64 = 0.85,
+        /// ... in this many detections in a row.
+        #[schemars(range(min = 1))]
+        pub again_sightings: u32 = 5,
+        /// Largest speed at which the person can have moved from the last seen position, m/s.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        pub reach_mps: f64 = 2.0,
+        /// Distance from the person below which another track may be confused with it, m:
+        /// appearances are compared, and nothing is learned.
+        #[schemars(range(min = 0.0))]
+        pub alone_m: f64 = 0.8,
+        /// Evidence from differences in appearance.
+        pub looks: LooksSettings,
+        /// Search for a lost person.
+        pub search: SearchSettings,
     }
 }
 
-/// Log-odds that two detections are of one person: the sum, over the kinds of difference, of a
-/// weight times the amount by which the difference is below its neutral value. Hellinger distances
-/// lie between 0, the same, and 1. The numbers are those that `tagalong follow
-/// configs/follow-depth.toml --split train --seeds 4 --fit` prints, a logistic regression over 60
-/// rides; every `tagalong follow` prints the calibration of the probabilities.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct LooksSettings {
-    /// Colours of the upper body: the neutral Hellinger distance, and the weight of one below it.
-    pub torso: [f64; 2],
-    /// Colours of the legs, likewise.
-    pub legs: [f64; 2],
-    /// Directions of edges on the upper body, likewise.
-    pub texture: [f64; 2],
-    /// Vectors of the network of `[appearance]`, which take the place of the three above: the
-    /// neutral distance (1 minus the cosine), and the weight of one below it. Not fitted, because no
-    /// network is shipped: fit it to yours with `tagalong follow --fit`.
-    pub vector: [f64; 2],
-    /// Height of the head: the neutral difference, m, and the weight of one metre below it.
-    pub height: [f64; 2],
-    /// Weight of being nearer to the person's appearance than to those of others seen beside them.
-    #[schemars(range(min = 0.0))]
-    pub rivals: f64,
-    /// Calibration of the reported probability: pairs of the probability by the log-odds above and
-    /// of the share of true matches among detections with it, both rising, with straight lines in
-    /// between. Decisions use the log-odds alone. Without pairs the probability is reported as it is.
-    /// `tagalong follow --fit` prints pairs by isotonic regression.
-    pub calibration: Vec<[f64; 2]>,
+settings! {
+    /// Log-odds that two detections are of one person: the sum, over the kinds of difference, of a
+    /// weight times the amount by which the difference is below its neutral value. Hellinger
+    /// distances lie between 0, the same, and 1. The numbers are those that `tagalong follow
+    /// configs/follow-depth.toml --split train --seeds 4 --fit` prints, a logistic regression over
+    /// 60 rides; every `tagalong follow` prints the calibration of the probabilities.
+    pub struct LooksSettings {
+        /// Colours of the upper body: the neutral Hellinger distance, and the weight of one below
+        /// it.
+        pub torso: [f64; 2] = [0.166, 12.566],
+        /// Colours of the legs, likewise.
+        pub legs: [f64; 2] = [0.472, 4.394],
+        /// Directions of edges on the upper body, likewise.
+        pub texture: [f64; 2] = [0.267, 7.819],
+        /// Vectors of the network of `[appearance]`, which take the place of the three above: the
+        /// neutral distance (1 minus the cosine), and the weight of one below it. Not fitted,
+        /// because no network is shipped: fit it to yours with `tagalong follow --fit`.
+        pub vector: [f64; 2] = [0.35, 12.0],
+        /// Height of the head: the neutral difference, m, and the weight of one metre below it.
+        pub height: [f64; 2] = [-0.045, 7.009],
+        /// Weight of being nearer to the person's appearance than to those of others seen beside
+        /// them.
+        #[schemars(range(min = 0.0))]
+        pub rivals: f64 = 5.49,
+        /// Calibration of the reported probability: pairs of the probability by the log-odds above
+        /// and of the share of true matches among detections with it, both rising, with straight
+        /// lines in between. Decisions use the log-odds alone. Without pairs the probability is
+        /// reported as it is. `tagalong follow --fit` prints pairs by isotonic regression.
+        pub calibration: Vec<[f64; 2]>,
+    }
 }
 
 impl LooksSettings {
@@ -175,59 +146,31 @@ impl LooksSettings {
     }
 }
 
-impl Default for LooksSettings {
-    fn default() -> Self {
-        Self {
-            torso: [0.166, 12.566],
-            legs: [0.472, 4.394],
-            texture: [0.267, 7.819],
-            vector: [0.35, 12.0],
-            height: [-0.045, 7.009],
-            rivals: 5.49,
-            calibration: Vec::new(),
-        }
-    }
-}
-
-/// Search for a lost person. It needs free space around the robot; without it the robot stands
-/// still when the person is lost.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-#[non_exhaustive]
-pub struct SearchSettings {
-    /// Turn towards where the person went, and drive to the last seen position.
-    pub enabled: bool,
-    /// Time to wait first, s: most people come back by themselves.
-    #[schemars(range(min = 0.0))]
-    pub wait_s: f64,
-    /// Largest turn rate, rad/s.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub turn_radps: f64,
-    /// Largest speed, m/s.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub speed_mps: f64,
-    /// Distance to the last seen position that counts as arrived, m.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub arrive_m: f64,
-    /// Time after which the drive there is given up, s.
-    #[schemars(range(min = 0.0))]
-    pub drive_s: f64,
-    /// Time after which the search is given up and the robot stands still, s.
-    #[schemars(range(min = 0.0))]
-    pub give_up_s: f64,
-}
-
-impl Default for SearchSettings {
-    fn default() -> Self {
-        Self {
-            enabled: false,
-            wait_s: 1.0,
-            turn_radps: 0.5,
-            speed_mps: 0.4,
-            arrive_m: 0.6,
-            drive_s: 8.0,
-            give_up_s: 20.0,
-        }
+settings! {
+    /// Search for a lost person. It needs free space around the robot; without it the robot stands
+    /// still when the person is lost.
+    #[non_exhaustive]
+    pub struct SearchSettings {
+        /// Turn towards where the person went, and drive to the last seen position.
+        pub enabled: bool = false,
+        /// Time to wait first, s: most people come back by themselves.
+        #[schemars(range(min = 0.0))]
+        pub wait_s: f64 = 1.0,
+        /// Largest turn rate, rad/s.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        pub turn_radps: f64 = 0.5,
+        /// Largest speed, m/s.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        pub speed_mps: f64 = 0.4,
+        /// Distance to the last seen position that counts as arrived, m.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        pub arrive_m: f64 = 0.6,
+        /// Time after which the drive there is given up, s.
+        #[schemars(range(min = 0.0))]
+        pub drive_s: f64 = 8.0,
+        /// Time after which the search is given up and the robot stands still, s.
+        #[schemars(range(min = 0.0))]
+        pub give_up_s: f64 = 20.0,
     }
 }
 
