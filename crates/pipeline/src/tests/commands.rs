@@ -211,6 +211,24 @@ fn p1_a_plugin_that_panics_stops_the_robot_in_the_same_tick() {
     }
 }
 
+#[test]
+fn the_cause_of_a_stop_by_a_fault_is_the_one_that_was_latched_first() {
+    let world = World::of((0..60).map(|_| vec![scored(5.0, person(3.0, 0.0))]));
+    let mut pipeline = world.pipeline(&format!("{PLAIN}\n[controller]\nplugin = 'drive'\n"));
+    let mut causes = Vec::new();
+    for i in 1..=40 {
+        if i == 21 {
+            pipeline.disarm("a button");
+        }
+        let mut frame = frame(i, i as f64 * 0.1);
+        frame.odometry_jumped = i == 30;
+        let report = pipeline.step(frame).unwrap();
+        causes.push(report.cause.map(|cause| cause.to_string()).unwrap_or_default());
+    }
+    assert!(causes[..20].iter().all(String::is_empty), "{causes:?}");
+    assert!(causes[20..].iter().all(|cause| cause == "a button"), "{causes:?}");
+}
+
 /// Ten minutes at fifteen frames a second.
 #[test]
 fn s3_without_people_there_is_no_track_and_every_command_is_zero() {

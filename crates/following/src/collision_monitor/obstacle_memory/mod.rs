@@ -40,6 +40,8 @@ pub(super) const CARRIED_M: f64 = 0.8;
 const STAYS_MPS: f64 = 0.25;
 /// Distance before a place from which on a nearer surface hides it, m.
 const BEFORE_M: f64 = 0.2;
+/// Distance behind a place from which on a surface is not that of the thing there, m.
+const BEHIND_M: f64 = 0.1;
 /// Resolution of the heights, m.
 const BAND_M: f64 = 0.1;
 /// Part of valid readings below which an image column is dark.
@@ -110,6 +112,8 @@ struct Obstacle {
     at: Point2<f64>,
     /// Heights at which it was seen above that.
     heights: Heights,
+    /// Time for which some of these have been free while it is seen, s: who walks off leaves none.
+    free_s: f64,
     /// Time for which it has been seen, s, without `beside_s`.
     seen_s: f64,
     /// Time for which it has been seen while the followed person was there and may have carried it,
@@ -297,7 +301,13 @@ impl ObstacleMemory {
                 return false;
             }
             if grid.is_something(at) {
-                thing.heights.0 |= grid.heights_around(at).0;
+                let seen = grid.heights_around(at);
+                let free = thing.heights.free(camera, depth, at, seen);
+                thing.free_s = if free.0 == 0 { 0.0 } else { thing.free_s + dt_s };
+                thing.heights.0 |= seen.0;
+                if thing.free_s >= STANDS_S {
+                    thing.heights.0 &= !free.0;
+                }
                 thing.see(settings, dt_s, target);
                 return true;
             }
@@ -305,7 +315,8 @@ impl ObstacleMemory {
             let is_gone = if thing.is_drop {
                 shows_floor(settings, camera, depth, at)
             } else {
-                shows_past(camera, depth, at, thing.heights)
+                // A few points at the edge of the image are not enough to see it, nor that it is gone.
+                !grid.has_points(at) && shows_past(camera, depth, at, thing.heights)
             };
             !is_gone && thing.unseen_s <= thing.kept_s(settings, footprint)
         });
@@ -397,6 +408,7 @@ impl Obstacle {
         Self {
             at,
             heights,
+            free_s: 0.0,
             seen_s: 0.0,
             beside_s: 0.0,
             unseen_s: 0.0,
@@ -455,11 +467,22 @@ impl Heights {
         self.metres().all(|height_m| height_m < LOW_M)
     }
 
-    /// Returns the middle of each height, m.
+    /// Returns the lower end of each height, m.
     fn metres(self) -> impl Iterator<Item = f64> {
-        (0..16)
-            .filter(move |bit| self.0 & (1 << bit) != 0)
-            .map(|bit| (f64::from(bit) + 0.5) * BAND_M)
+        (0..16).filter(move |bit| self.0 & (1 << bit) != 0).map(|bit| f64::from(bit) * BAND_M)
+    }
+
+    /// Returns those of these heights that are free while something is `seen` at others: those of a
+    /// person who got up from a chair, by which it would seem to be gone when it is below the image.
+    fn free(self, camera: &Camera, depth: &DepthImage, at: &Point2<f64>, seen: Self) -> Self {
+        let mut free = Self::default();
+        for height_m in Self(self.0 & !seen.0).metres() {
+            let behind_m = behind_m(camera, depth, at, height_m);
+            if behind_m.is_some_and(|behind_m| behind_m > BEHIND_M) {
+                free.0 |= Self::of(height_m + 0.5 * BAND_M).0;
+            }
+        }
+        free
     }
 }
 
@@ -574,6 +597,11 @@ impl Grid {
         self.around(at).iter().any(|cell| self.points[*cell] >= ENOUGH)
     }
 
+    /// Returns true if there is any point here, or one cell away.
+    fn has_points(&self, at: &Point2<f64>) -> bool {
+        self.around(at).iter().any(|cell| self.points[*cell] > 0)
+    }
+
     fn clear_around(&mut self, at: &Point2<f64>) {
         self.around(at).iter().for_each(|cell| self.points[*cell] = 0);
     }
@@ -611,13 +639,21 @@ fn is_reading(depth_m: f64) -> bool {
 /// Returns true if the image shows a surface behind a place at one of the heights. Out of the image
 /// and at pixels without depth it shows nothing.
 fn shows_past(camera: &Camera, depth: &DepthImage, at: &Point2<f64>, heights: Heights) -> bool {
-    heights.metres().any(|height_m| {
-        let place = Point3::new(at.x, at.y, height_m);
-        let seen_m = camera.project(&place).and_then(|pixel| {
-            depth.get(pixel.x.round() as i64, pixel.y.round() as i64).map(f64::from)
-        });
-        seen_m.is_some_and(|z| is_reading(z) && z > camera.depth_of(&place) - BEFORE_M)
+    // Both ends of a height: at the edge of the image a thing in between may be out of view.
+    heights.metres().any(|low_m| {
+        [low_m, low_m + BAND_M].into_iter().all(|height_m| {
+            behind_m(camera, depth, at, height_m).is_some_and(|behind_m| behind_m > -BEFORE_M)
+        })
     })
+}
+
+/// Returns how far behind a place at a height the surface is that the image shows there, m; `None` out
+/// of the image and at pixels without depth.
+fn behind_m(camera: &Camera, depth: &DepthImage, at: &Point2<f64>, height_m: f64) -> Option<f64> {
+    let place = Point3::new(at.x, at.y, height_m);
+    let pixel = camera.project(&place)?;
+    let z = f64::from(depth.get(pixel.x.round() as i64, pixel.y.round() as i64)?);
+    is_reading(z).then(|| z - camera.depth_of(&place))
 }
 
 /// Returns true if the image shows a surface at a place of the floor that is no fall.

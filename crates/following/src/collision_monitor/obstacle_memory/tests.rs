@@ -182,6 +182,26 @@ fn what_the_person_sat_on_is_remembered_when_they_have_gone() {
     assert!(is_at(then, 0.25), "{then:?}");
 }
 
+/// A box sinks below the image: with its last decimetre not filled, and after a person got up from it.
+#[test]
+fn what_sinks_below_the_image_is_not_gone_by_the_heights_above_it() {
+    for (top_m, sitter_m) in [(0.62, None), (0.58, Some(1.4))] {
+        let mut surroundings = memory();
+        let both = with_box_of(1.5, 0.0, sitter_m.unwrap_or(top_m));
+        for _ in 0..WAIT {
+            surroundings.ahead_after(&both, 0.0, None);
+        }
+        let mut then = None;
+        for step in 0..=20 {
+            let driven_m = 0.05 * f64::from(step);
+            let forward = if step == 0 { 0.0 } else { 0.05 };
+            let depth = with_box_of(1.5 - driven_m, 0.0, top_m);
+            then = surroundings.ahead_after(&depth, forward, None);
+        }
+        assert!(is_at(then, 0.25), "{top_m}: {then:?}");
+    }
+}
+
 /// The seat of a chair, whose back stands beside the path, is in view for two frames.
 #[test]
 fn a_low_part_of_what_stands_is_remembered_though_it_was_seen_briefly() {
