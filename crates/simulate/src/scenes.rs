@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// Names of the scenes of `configs/scenes`, with their texts.
-const BUILT_IN: [(&str, &str); 64] = [
+const BUILT_IN: [(&str, &str); 66] = [
     ("among-circular", include_str!("../configs/scenes/among-circular.toml")),
     ("among-clutter", include_str!("../configs/scenes/among-clutter.toml")),
     ("among-corridor", include_str!("../configs/scenes/among-corridor.toml")),
@@ -15,6 +15,7 @@ const BUILT_IN: [(&str, &str); 64] = [
     ("cafeteria", include_str!("../configs/scenes/cafeteria.toml")),
     ("cafeteria-high", include_str!("../configs/scenes/cafeteria-high.toml")),
     ("cheap-laser", include_str!("../configs/scenes/cheap-laser.toml")),
+    ("coat-off", include_str!("../configs/scenes/coat-off.toml")),
     ("corridor", include_str!("../configs/scenes/corridor.toml")),
     ("corridor-high", include_str!("../configs/scenes/corridor-high.toml")),
     ("crossing", include_str!("../configs/scenes/crossing.toml")),
@@ -55,6 +56,7 @@ const BUILT_IN: [(&str, &str); 64] = [
     ("full-occlusion", include_str!("../configs/scenes/full-occlusion.toml")),
     ("lidar-rings", include_str!("../configs/scenes/lidar-rings.toml")),
     ("lidar-rosette", include_str!("../configs/scenes/lidar-rosette.toml")),
+    ("light-changes", include_str!("../configs/scenes/light-changes.toml")),
     ("mirrors", include_str!("../configs/scenes/mirrors.toml")),
     ("office", include_str!("../configs/scenes/office.toml")),
     ("office-high", include_str!("../configs/scenes/office-high.toml")),
