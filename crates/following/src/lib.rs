@@ -44,6 +44,6 @@ pub use settings::FollowSettings;
 pub use skill::{Choice, Enrollment, EnrollmentError, FollowStatus, PersonStatus};
 pub use steering::{Steered, Steering};
 pub use target_lock::{
-    AppearanceMemory, ChoiceRule, Differences, Likeness, LockReport, LockState, LooksSettings, SearchSettings,
-    TargetSettings,
+    AppearanceMemory, ChoiceRule, Differences, Likeness, LockReport, LockState, LooksSettings,
+    SearchSettings, TargetSettings,
 };

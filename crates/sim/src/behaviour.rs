@@ -6,7 +6,8 @@ use nalgebra::{Point2, Rotation2, Vector2};
 
 use crate::body::{Stance, feet_ahead_m};
 use crate::gait::Gait;
-use crate::person::Person;
+use crate::material::Material;
+use crate::person::{Extra, Outfit, Person};
 use crate::posture::Posture;
 use crate::scene::{AtEnd, PersonSettings, Trick};
 
@@ -70,6 +71,8 @@ pub struct Walker {
     /// Leader of a companion, and the offset in the leader's axes, m.
     pub beside: Option<(usize, Vector2<f64>)>,
     settings: PersonSettings,
+    /// Clothes under a coat that is not taken off yet.
+    under_coat: Option<Outfit>,
     velocity: Vector2<f64>,
     /// Index into the path of the point ahead; past its end on arrival.
     ahead: usize,
@@ -102,12 +105,38 @@ impl Walker {
             stance,
             beside: None,
             settings,
+            under_coat: None,
             velocity: Vector2::zeros(),
             ahead: 1,
             waits_until_s,
             tricked: false,
             held_up_s: 0.0,
             turns: Vec::new(),
+        }
+    }
+
+    /// Returns true if the person takes off a coat.
+    pub fn has_coat(&self) -> bool {
+        self.settings.coat_off_s.is_some()
+    }
+
+    /// Puts a coat of this material over the clothes.
+    pub fn in_coat(mut self, material: Material) -> Self {
+        let own = self.person.look.clone();
+        self.person.look.top = material;
+        if !own.extras.contains(&Extra::Coat) {
+            self.person.look.extras.push(Extra::Coat);
+        }
+        self.under_coat = Some(own);
+        self
+    }
+
+    /// Takes the coat off when it is time.
+    fn take_off_coat(&mut self, now_s: f64) {
+        if self.settings.coat_off_s.is_some_and(|at_s| now_s >= at_s)
+            && let Some(own) = self.under_coat.take()
+        {
+            self.person.look = own;
         }
     }
 
@@ -182,6 +211,7 @@ impl Walker {
     /// Moves the body of a walker that has taken a step.
     fn finish_step(&mut self, now_s: f64, dt: f64, lead: Option<&Lead>) {
         self.get_up(now_s);
+        self.take_off_coat(now_s);
         self.turn(dt, lead);
         self.stride(dt);
         self.bend(now_s, dt);
@@ -460,6 +490,21 @@ mod tests {
             }
             see(walkers);
         }
+    }
+
+    #[test]
+    fn a_coat_is_worn_until_it_is_taken_off() {
+        let path = vec![[1.0, 1.0], [9.0, 1.0]];
+        let settings = PersonSettings { path, coat_off_s: Some(2.0), ..PersonSettings::default() };
+        let own = Person::subject(1);
+        let coat = Person::subject(2).look.top;
+        let mut one = Walker::new(own.clone(), settings).in_coat(coat);
+        one.step(1.9, 0.1, None, &[], &[]);
+        let look = &one.person.look;
+        assert!(look.top == coat && look.extras.contains(&Extra::Coat), "{look:?}");
+        assert_eq!(look.trousers, own.look.trousers);
+        one.step(2.0, 0.1, None, &[], &[]);
+        assert_eq!(one.person, own);
     }
 
     #[test]

@@ -382,6 +382,10 @@ settings! {
         pub look: Option<u64>,
         /// Things put on or carried; by chance if left out.
         pub extras: Option<Vec<Extra>>,
+        /// Time at which the person takes off a coat, s: until then a coat in the colours of another
+        /// one's clothes is over the own ones. None without a coat to take off.
+        #[schemars(range(min = 0.0, max = 86400.0))]
+        pub coat_off_s: Option<f64>,
     }
 }
 

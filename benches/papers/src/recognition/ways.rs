@@ -17,23 +17,30 @@ const NEWS: f64 = 0.06;
 /// Time between two appearances of a person from which on their difference tells how much the person
 /// changes, s.
 const APART_S: f64 = 1.0;
-/// Least variance of a difference: a few sightings of a person at rest hardly vary.
-const LEAST_VARIANCE: f64 = 0.003;
+/// Least standard deviation of a difference, of height in m: a few sightings of a person at rest hardly
+/// vary.
+const LEAST_DEVIATION: f64 = 0.03;
+/// Difference in height at which the kernel has fallen to 0.6, m.
+const HEIGHT_M: f64 = 0.05;
+/// Squared distance of appearances without a part in common.
+const UNKNOWN: f64 = 0.5;
 
 /// Weighing of the appearance of somebody against what is remembered.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Way {
     /// The lock: its weights are the same for everybody.
     Fixed,
-    /// Ridge regression with the appearances of the person as +1 and those of others as -1; the kernel
-    /// is the mean overlap of the histograms.
+    /// Ridge regression with the appearances of the person as +1 and those of others as -1, added to the
+    /// lock. The kernel falls with the mean squared Hellinger distance and with the difference in height.
     Ridge {
+        /// Decay of the kernel with the mean squared distance.
+        decay: f64,
         /// Penalty.
         lambda: f64,
         /// Log-odds of +1.
         weight: f64,
     },
-    /// The lock with weights and neutral differences by the spread of this person's differences and of
+    /// The lock with neutral differences and weights by the spread of this person's differences and of
     /// those to others.
     Metric {
         /// Number of appearances that the fixed weights count as.
@@ -50,13 +57,18 @@ pub(super) struct Known {
     kept: Vec<Appearance>,
     /// Number of those.
     own: usize,
-    gram: DMatrix<f64>,
-    /// Differences of the person's appearances from each other, and of others from them.
+    /// Their distances from each other.
+    distances: DMatrix<Distance>,
+    /// Differences of the person's appearances from what the memory would have without them, and those
+    /// of others.
     spread: [Vec<[Option<f64>; PARTS]>; 2],
 }
 
 /// Torso, legs, texture and height.
 const PARTS: usize = 4;
+
+/// Mean squared Hellinger distance of the known parts, and the difference in height, m.
+type Distance = (f64, f64);
 
 impl Known {
     /// Remembers a person and all others among sightings, in the order of time.
@@ -76,11 +88,10 @@ impl Known {
         let mut kept = remembered(&of_person, KEPT);
         let own = kept.len();
         kept.extend(remembered(&of_others, 0));
-        let gram = DMatrix::from_fn(kept.len(), kept.len(), |i, j| overlap(&kept[i], &kept[j]));
-        let within = within(&of_person);
-        let between = of_others.iter().filter_map(|other| nearest(other, of_person.iter().copied()));
-        let spread = [within, between.collect()];
-        Self { person, memory, kept, own, gram, spread }
+        let distances =
+            DMatrix::from_fn(kept.len(), kept.len(), |i, j| distance(&kept[i], &kept[j]));
+        let spread = [&of_person, &of_others].map(|of| spread(of, &of_person));
+        Self { person, memory, kept, own, distances, spread }
     }
 
     /// Returns the log-odds that each of the candidates is the person.
@@ -88,14 +99,11 @@ impl Known {
         let fixed = self.by_settings(&LooksSettings::default(), candidates);
         match way {
             Way::Fixed => fixed,
-            Way::Ridge { lambda, weight } => {
-                let Some(alpha) = self.ridge(lambda) else { return fixed };
-                let learnt = candidates.iter().map(|looks| weight * self.response(&alpha, looks));
-                fixed.iter().zip(learnt).map(|(fixed, learnt)| beside(*fixed, learnt)).collect()
-            }
-            Way::Metric { prior } => {
-                let learnt = self.by_settings(&self.metric(prior), candidates);
-                fixed.iter().zip(learnt).map(|(fixed, learnt)| beside(*fixed, learnt)).collect()
+            Way::Metric { prior } => self.by_settings(&self.metric(prior), candidates),
+            Way::Ridge { decay, lambda, weight } => {
+                let Some(alpha) = self.ridge(decay, lambda) else { return fixed };
+                let learnt = candidates.iter().map(|looks| self.response(&alpha, decay, looks));
+                fixed.iter().zip(learnt).map(|(fixed, learnt)| fixed + weight * learnt).collect()
             }
         }
     }
@@ -106,13 +114,13 @@ impl Known {
     }
 
     /// Returns the coefficients of the ridge regression; `None` without others.
-    fn ridge(&self, lambda: f64) -> Option<DVector<f64>> {
+    fn ridge(&self, decay: f64, lambda: f64) -> Option<DVector<f64>> {
         let all = self.kept.len();
         let others = all - self.own;
         if others == 0 || self.own == 0 {
             return None;
         }
-        let mut gram = self.gram.clone();
+        let mut gram = self.distances.map(|distance| kernel(distance, decay));
         for i in 0..all {
             // Both classes count the same, however many appearances each has.
             let of_class = if i < self.own { self.own } else { others };
@@ -122,9 +130,9 @@ impl Known {
         gram.lu().solve(&targets)
     }
 
-    fn response(&self, alpha: &DVector<f64>, looks: &Appearance) -> f64 {
+    fn response(&self, alpha: &DVector<f64>, decay: f64, looks: &Appearance) -> f64 {
         let terms = self.kept.iter().zip(alpha.iter());
-        terms.map(|(kept, weight)| weight * overlap(kept, looks)).sum()
+        terms.map(|(kept, weight)| weight * kernel(distance(kept, looks), decay)).sum()
     }
 
     /// Returns the settings of the lock, learnt from the differences seen so far.
@@ -149,19 +157,13 @@ impl Known {
         else {
             return fixed;
         };
-        let variance = (0.5 * (near_variance + far_variance)).max(LEAST_VARIANCE);
+        let variance = (0.5 * (near_variance + far_variance)).max(LEAST_DEVIATION.powi(2));
         let weight = ((far - near) / variance).max(0.0);
         let count = self.spread[0].len().min(self.spread[1].len()) as f64;
         let share = count / (count + prior);
         let learnt = [0.5 * (near + far), weight];
         [0, 1].map(|i| share * learnt[i] + (1.0 - share) * fixed[i])
     }
-}
-
-/// Returns the log-odds of the lock with those of a classifier beside it: where the lock refuses a person,
-/// the classifier cannot accept them.
-fn beside(fixed: f64, learnt: f64) -> f64 {
-    if fixed < 0.0 { fixed + learnt.min(0.0) } else { fixed + learnt }
 }
 
 /// Returns mean and variance; `None` for less than three values.
@@ -187,40 +189,35 @@ fn remembered(seen: &[&Sighting], kept: usize) -> Vec<Appearance> {
     all
 }
 
-/// Returns the mean overlap of the histograms that two appearances have, 0 to 1.
-fn overlap(a: &Appearance, b: &Appearance) -> f64 {
+/// Returns the distance of two appearances.
+fn distance(a: &Appearance, b: &Appearance) -> Distance {
     let difference = a.difference(b);
-    let mut sum = 0.0;
-    let mut count: f64 = 0.0;
-    for distance in [difference.torso, difference.legs, difference.texture].into_iter().flatten() {
-        // A Hellinger distance is the root of 1 minus the overlap.
-        sum += 1.0 - distance * distance;
-        count += 1.0;
-    }
-    sum / count.max(1.0)
+    let parts = [difference.torso, difference.legs, difference.texture];
+    let squares: Vec<f64> = parts.into_iter().flatten().map(|part| part * part).collect();
+    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+    (if squares.is_empty() { UNKNOWN } else { mean }, a.height_m - b.height_m)
 }
 
-/// Returns the differences of each sighting of a person from the most alike one at another time.
-fn within(of_person: &[&Sighting]) -> Vec<[Option<f64>; PARTS]> {
-    let each = of_person.iter().filter_map(|sighting| {
-        let apart = of_person.iter().copied();
-        nearest(sighting, apart.filter(|other| (other.at_s - sighting.at_s).abs() >= APART_S))
+fn kernel((square, height_m): Distance, decay: f64) -> f64 {
+    (-decay * square - 0.5 * (height_m / HEIGHT_M).powi(2)).exp()
+}
+
+/// Returns the differences of sightings from the person's at other times: of the most alike one, and
+/// from the mean height.
+fn spread(of: &[&Sighting], of_person: &[&Sighting]) -> Vec<[Option<f64>; PARTS]> {
+    let height_m = of_person.iter().map(|sighting| sighting.looks.height_m).sum::<f64>()
+        / of_person.len() as f64;
+    let each = of.iter().filter_map(|sighting| {
+        let apart = of_person.iter().filter(|other| (other.at_s - sighting.at_s).abs() >= APART_S);
+        let found = apart.filter_map(|other| {
+            let difference = sighting.looks.difference(&other.looks);
+            Some((difference.mean()?, difference))
+        });
+        let (_, nearest) = found.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let height_m = (sighting.looks.height_m - height_m).abs();
+        Some([nearest.torso, nearest.legs, nearest.texture, Some(height_m)])
     });
     each.collect()
-}
-
-/// Returns the differences of a sighting from the most alike one of others.
-fn nearest<'a>(
-    sighting: &Sighting,
-    others: impl Iterator<Item = &'a Sighting>,
-) -> Option<[Option<f64>; PARTS]> {
-    let all = others.filter_map(|other| {
-        let difference = sighting.looks.difference(&other.looks);
-        let height_m = (sighting.looks.height_m - other.looks.height_m).abs();
-        let parts = [difference.torso, difference.legs, difference.texture, Some(height_m)];
-        Some((difference.mean()?, parts))
-    });
-    all.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, parts)| parts)
 }
 
 #[cfg(test)]
@@ -239,20 +236,12 @@ mod tests {
     }
 
     #[test]
-    fn a_classifier_takes_nobody_whom_the_lock_would_not() {
-        for (fixed, learnt, expected) in
-            [(-1.0, 3.0, -1.0), (-1.0, -2.0, -3.0), (1.0, -3.0, -2.0), (1.0, 2.0, 3.0)]
-        {
-            assert_eq!(beside(fixed, learnt), expected, "{fixed} and {learnt}");
-        }
-    }
-
-    #[test]
     fn both_classifiers_speak_for_the_person_and_against_others() {
         let known = known();
         let [own, other] = [3, 7].map(|colour| Appearance::in_one_colour(1.6, Some(colour)));
         let fixed = known.log_odds(Way::Fixed, &[&own, &other]);
-        for way in [Way::Ridge { lambda: 0.1, weight: 4.0 }, Way::Metric { prior: 2.0 }] {
+        for way in [Way::Ridge { decay: 6.0, lambda: 0.1, weight: 4.0 }, Way::Metric { prior: 2.0 }]
+        {
             let learnt = known.log_odds(way, &[&own, &other]);
             assert!(learnt[0] > fixed[0] && learnt[1] < fixed[1], "{way:?}: {learnt:?}, {fixed:?}");
         }
@@ -261,10 +250,10 @@ mod tests {
     #[test]
     fn a_ridge_of_disjoint_colours_answers_with_the_targets() {
         let known = known();
-        let alpha = known.ridge(0.001).expect("there are others");
+        let alpha = known.ridge(30.0, 0.001).expect("there are others");
         for (colour, target) in [(3, 1.0), (7, -1.0), (11, 0.0)] {
             let looks = Appearance::in_one_colour(1.6, Some(colour));
-            assert!((known.response(&alpha, &looks) - target).abs() < 1e-2, "{colour}");
+            assert!((known.response(&alpha, 30.0, &looks) - target).abs() < 1e-2, "{colour}");
         }
     }
 
@@ -275,7 +264,10 @@ mod tests {
         let looks = Appearance::in_one_colour(1.7, Some(4));
         let fixed = known.log_odds(Way::Fixed, &[&looks]);
         assert!(fixed[0] < 0.0, "{fixed:?}");
-        assert_eq!(known.log_odds(Way::Ridge { lambda: 1.0, weight: 8.0 }, &[&looks]), fixed);
+        assert_eq!(
+            known.log_odds(Way::Ridge { decay: 6.0, lambda: 1.0, weight: 8.0 }, &[&looks]),
+            fixed
+        );
     }
 
     #[test]

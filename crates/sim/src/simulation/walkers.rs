@@ -89,7 +89,12 @@ fn somebody(settings: PersonSettings, split: Split, random: &mut Random) -> Walk
     if let Some(height_m) = settings.height_m {
         person.build.height_m = height_m;
     }
-    Walker::new(person, settings)
+    let own = settings.look.or(settings.subject).unwrap_or(any);
+    let walker = Walker::new(person, settings);
+    if walker.has_coat() {
+        return walker.in_coat(Person::subject(split.subject((own + 1) % SUBJECTS)).look.top);
+    }
+    walker
 }
 
 /// Returns a person that walks between random points of the room.
@@ -151,4 +156,28 @@ fn free_point(
             && walkers.iter().all(|w| (*at - w.stance.place).norm() > 1.0)
     });
     *free.unwrap_or(&tries[0])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::person::Extra;
+
+    #[test]
+    fn a_coat_over_the_same_clothes_is_that_of_another_one() {
+        fn first(text: &str) -> Walker {
+            let scene = Scene::parse(text).expect("the scene is right");
+            let walkers = walkers(&scene, &[], &mut Random::new(scene.seed, 1));
+            walkers.into_iter().next().expect("there is a person")
+        }
+
+        let plain = "[[people]]\npath = [[2.0, 2.0]]\nlook = 4\nextras = []\n";
+        let own = first(plain).person;
+        let coat = first(&format!("{plain}coat_off_s = 3.0\n")).person;
+        assert_eq!((coat.build, &coat.look.trousers), (own.build, &own.look.trousers));
+        assert_eq!(coat.look.extras, [Extra::Coat]);
+        let split = Scene::default().split();
+        assert_eq!(coat.look.top, Person::subject(split.subject(5)).look.top);
+        assert!(first(plain).person.look.extras.is_empty());
+    }
 }
