@@ -2,12 +2,15 @@
 //!
 //! The runtime that Tagalong brings is written in Rust and needs no library. onnxruntime is about
 //! twice as fast on a CPU, and runs on graphics cards. It is a library of the user: the environment
-//! variable `ORT_DYLIB_PATH` names it. [`register`] adds the plugin `onnxruntime`, which has the
+//! variable `ORT_DYLIB_PATH` names it, or it is found in the active Python environment, among the user's
+//! Python packages or in the system. [`register`] adds the plugin `onnxruntime`, which has the
 //! settings of `onnx`; [`onnxruntime`] is the runtime by itself.
 
-use std::env;
-use std::path::Path;
+mod library;
+
 use std::sync::OnceLock;
+
+pub use library::LIBRARY;
 
 use ort::environment::Environment;
 use ort::session::{Session, SessionInputValue};
@@ -18,8 +21,6 @@ use tagalong_onnx::Onnx;
 
 /// Name of the plugin in configs.
 pub const NAME: &str = "onnxruntime";
-/// Environment variable with the path of the library.
-pub const LIBRARY: &str = "ORT_DYLIB_PATH";
 
 /// Registers the plugin.
 pub fn register(registry: &mut Registry) {
@@ -57,14 +58,17 @@ fn environment() -> Result<&'static Environment, String> {
 }
 
 fn load() -> Result<Environment, String> {
-    let path = env::var_os(LIBRARY).filter(|path| !path.is_empty()).ok_or_else(|| {
-        format!("needs onnxruntime: set {LIBRARY} to the path of its library (libonnxruntime.so)")
+    let path = library::path().ok_or_else(|| {
+        format!(
+            "needs onnxruntime: `pip install onnxruntime`, or set {LIBRARY} to the path of its library \
+             (libonnxruntime.so)"
+        )
     })?;
     let builder = ort::init_from(&path).map_err(|why| why.to_string());
     let built = builder.and_then(|builder| builder.build().map_err(|why| why.to_string()));
     built.map_err(|why| {
-        let shown = Path::new(&path).display();
-        format!("needs onnxruntime, which {shown} ({LIBRARY}) is not: {why}")
+        let shown = path.display();
+        format!("needs onnxruntime, which {shown} is not ({LIBRARY} names another one): {why}")
     })
 }
 

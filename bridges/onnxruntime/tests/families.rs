@@ -92,9 +92,7 @@ fn damaged_files_are_refused() {
 
 #[test]
 fn without_a_library_the_error_says_how_to_name_it() {
-    if env::var_os(LIBRARY).is_some() {
-        return;
-    }
-    let why = load(Family::Yolox).err().unwrap();
-    assert!(why.contains("set ORT_DYLIB_PATH"), "{why}");
+    // One may be found that no variable names.
+    let Err(why) = load(Family::Yolox) else { return };
+    assert!(why.contains("ORT_DYLIB_PATH"), "{why}");
 }

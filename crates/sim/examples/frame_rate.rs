@@ -19,6 +19,9 @@ const SHOTS: usize = 10;
 const ROUNDS: usize = 2;
 
 const RGBD: &str = "crowd = 5\nseed = 6\n[room]\nsize_m = [12.0, 8.0]\nclutter = 6\n";
+/// The camera and the room of the rides of `tagalong follow`.
+const RIDE: &str = "crowd = 2\nseed = 5\n[room]\nsize_m = [16.0, 6.0]\nclutter = 5\n[camera]\nwidth = 200\n\
+    height = 150\nfield_of_view_deg = 70.0\n";
 const STEREO: &str = "crowd = 5\nseed = 9\n[room]\nsize_m = [12.0, 9.0]\nheight_m = 3.5\n\
     floor = \"tiles\"\nclutter = 5\n[camera]\nkind = \"stereo\"\nwidth = 512\nheight = 384\n\
     field_of_view_deg = 100.0\nbaseline_m = 0.12\n";
@@ -34,6 +37,7 @@ fn main() {
         ("RGB-D 640x480, five people, at rest", RGBD.to_owned() + RESTS),
         ("RGB-D 640x480 on a carpet, moving", format!("{RGBD}floor = \"carpet\"\n{MOVES}")),
         ("depth 640x480, five people, moving", format!("{RGBD}[camera]\ncolour = false\n{MOVES}")),
+        ("RGB-D 200x150 of a ride, two people, moving", RIDE.to_owned() + MOVES),
         ("stereo 512x384, five people, moving", STEREO.to_owned() + MOVES),
         ("stereo 512x384, five people, at rest", STEREO.to_owned() + RESTS),
         (
@@ -42,7 +46,7 @@ fn main() {
         ),
     ];
     println!(
-        "{:<42} {:>12} {:>10} {:>10}  digest",
+        "{:<44} {:>12} {:>10} {:>10}  digest",
         "camera", "processor ms", "1 thread/s", "2 threads/s"
     );
     let part = std::env::args().nth(1).unwrap_or_default();
@@ -53,7 +57,7 @@ fn main() {
         assert_eq!(one.digest, two.digest, "the images depend on the number of threads");
         let Rate { processor_ms, per_s, digest } = one;
         println!(
-            "{name:<42} {processor_ms:>12.1} {per_s:>10.1} {:>10.1}  {digest:016x}",
+            "{name:<44} {processor_ms:>12.1} {per_s:>10.1} {:>10.1}  {digest:016x}",
             two.per_s
         );
     }

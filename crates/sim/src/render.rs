@@ -65,15 +65,15 @@ impl WorldCamera<'_> {
         let row_groups = width.div_ceil(TILE);
         let rows = groups.len() / row_groups;
         let eye = self.eye(top);
-        let sights = before(self.world.solids(), &eye.at, &eye.forward());
         let edge = |y: usize| [eye.corner(0, y), eye.corner(width, y)];
-        let strip = between(&sights, edge(top), edge(top + rows));
+        let edges = [edge(top), edge(top + rows)];
+        let strip = before(self.world.solids(), &eye.at, &eye.forward(), edges);
         let mut tile = Tile::default();
         for number in 0..row_groups {
             let left = number * TILE;
             let right = width.min(left + TILE);
             let edge = |x: usize| [eye.corner(x, top), eye.corner(x, top + rows)];
-            let solids = between(strip.iter().copied(), edge(left), edge(right));
+            let solids = between(&strip, edge(left), edge(right));
             let rays = |row: usize, to: &mut Vectors| eye.rays([left, 1, top + row], to);
             tile.look(&solids, &eye.at, [right - left, rows], rays);
             let columns = groups.iter_mut().skip(number).step_by(row_groups);
@@ -110,9 +110,16 @@ impl WorldCamera<'_> {
         let mut seen = 0u32;
         let mut bounds: Option<[f64; 4]> = None;
         let mut hiders = std::collections::BTreeMap::<u16, u32>::new();
+        let mut strip = top / TILE;
+        let mut eye = self.eye(top);
+        let mut alone = views(shapes, &eye.at);
         for row in (top..bottom).step_by(step) {
-            let eye = self.eye(row);
-            let alone: Vec<_> = shapes.iter().map(|shape| shape.seen_from(&eye.at)).collect();
+            // All rows of a strip are seen from one place.
+            if row / TILE != strip {
+                strip = row / TILE;
+                eye = self.eye(row);
+                alone = views(shapes, &eye.at);
+            }
             let columns = || (left..right).step_by(step);
             let groups = columns().step_by(LANES);
             let mut rays = Vectors::ZERO;
@@ -149,7 +156,7 @@ impl WorldCamera<'_> {
         eye: &Point3<f64>,
         rows: &mut [&mut HitGroup],
     ) {
-        for row in tile.mixed_rows() {
+        for row in tile.open_rows() {
             *rows[row] = HitGroup::NOTHING;
         }
         let TileParts { tile, shading, group } = tile.parts();
@@ -188,6 +195,11 @@ impl WorldCamera<'_> {
             }
         }
     }
+}
+
+/// Returns solids as they are seen from an eye.
+fn views(of: &[Shape], eye: &Point3<f64>) -> Vec<SolidView> {
+    of.iter().map(|shape| shape.seen_from(eye)).collect()
 }
 
 /// One for each ray that meets some of these solids.

@@ -1,5 +1,9 @@
-//! Shadows: for each direction from a lamp, the few solids that may stand there
-//! (the light buffer of Haines & Greenberg 1986, on the faces of a cube).
+//! Shadows: for each direction from a lamp, the few solids that may stand there. What stands still is
+//! sorted into cells of directions (the light buffer of Haines & Greenberg 1986, on the faces of a
+//! cube); what moves has balls around solids that belong together, which take less time to make than
+//! cells for every image.
+
+use std::ops::Range;
 
 use nalgebra::{Point3, Vector3};
 
@@ -8,25 +12,42 @@ use crate::seen::SolidView;
 use crate::shape::Shape;
 use crate::sight::{before, between};
 
-/// Cells along the side of a face of the cube for what moves, which is sorted into them anew for
-/// every image, and for what stands still.
-pub const COARSE: usize = 16;
-/// See [`COARSE`].
-pub const FINE: usize = 2 * COARSE;
+/// Cells along the side of a face of the cube.
+pub const SIDE: usize = 32;
 /// A bundle of ways through more cells is held against each solid instead.
 const MOST_CELLS: usize = 64;
 /// Room for rounding, m, and on a face, whose half side is 1.
 const SLACK_M: f64 = 1e-4;
 const SLACK: f64 = 1e-6;
 
+/// Middle of a ball as seen from the lamp, and its radius, m.
+type Ball = (Vector3<f64>, f64);
+
 /// Objects around a lamp that cast shadows.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Shadows {
+    lamp: Point3<f64>,
+    shapes: Vec<Shape>,
+    /// As the lamp sees them.
+    solids: Vec<SolidView>,
+    /// Balls around them.
+    balls: Vec<Ball>,
+    index: Index,
+}
+
+/// Finds the solids that may stand in a bundle of ways.
+#[derive(Clone, Debug)]
+enum Index {
+    Cells(Cells),
+    /// Balls around solids that belong together, and the numbers of these.
+    Groups(Vec<(Ball, Range<u32>)>),
+}
+
+/// Solids by the directions in which they stand.
+#[derive(Clone, Debug)]
+struct Cells {
     /// Cells along the side of a face.
     side: usize,
-    solids: Vec<SolidView>,
-    /// Balls around them: the middle as seen from the lamp, and the radius, m.
-    balls: Vec<(Vector3<f64>, f64)>,
     /// Numbers of solids, cell by cell.
     numbers: Vec<u32>,
     /// Six faces of rows of cells: where the numbers of each cell end.
@@ -34,71 +55,90 @@ pub struct Shadows {
 }
 
 impl Shadows {
-    /// The shadows that some solids throw, in faces of `side` by `side` cells.
-    pub fn new<'a>(
+    /// The shadows that solids throw which stand still, in faces of `side` by `side` cells.
+    pub fn still<'a>(
         side: usize,
         lamp: Point3<f64>,
         solids: impl Iterator<Item = (Option<u16>, &'a Shape)> + Clone,
     ) -> Self {
-        let seen = solids.clone().map(|(_, solid)| solid.seen_from(&lamp)).collect();
-        let bounds = solids.clone().map(|(_, solid)| solid.bound());
-        let balls = bounds.map(|(centre, radius)| (centre - lamp, radius)).collect();
-        let mut shadows = Self { side, solids: seen, balls, ..Self::default() };
-        for face in 0..6 {
-            let sights = before(solids.clone(), &lamp, &on_face(face, 0.0, 0.0));
-            let line = |number| line(number, side);
-            let row = |row| [on_face(face, -1.0, line(row)), on_face(face, 1.0, line(row))];
-            let column = |c| [on_face(face, line(c), -1.0), on_face(face, line(c), 1.0)];
-            // Most solids are on one face only.
-            let sights = between(&sights, row(0), row(side));
-            let sights = between(sights, column(0), column(side));
-            for above in 0..side {
-                let strip = between(sights.iter().copied(), row(above), row(above + 1));
-                for left in 0..side {
-                    let cell = between(strip.iter().copied(), column(left), column(left + 1));
-                    shadows.numbers.extend(cell.iter().map(|sight| sight.number));
-                    shadows.ends.push(shadows.numbers.len() as u32);
-                }
+        let index = Index::Cells(Cells::new(side, lamp, solids.clone()));
+        let mut shadows = Self::none(lamp, index);
+        shadows.add(solids.map(|(_, solid)| solid));
+        shadows
+    }
+
+    /// The shadows that objects throw which move, solid by solid of each.
+    pub fn moving<'a, S: Iterator<Item = &'a Shape>>(
+        lamp: Point3<f64>,
+        objects: impl Iterator<Item = S>,
+    ) -> Self {
+        let mut groups = Vec::new();
+        let mut shadows = Self::none(lamp, Index::Groups(Vec::new()));
+        for solids in objects {
+            let first = shadows.balls.len();
+            shadows.add(solids);
+            let balls = &shadows.balls[first..];
+            if !balls.is_empty() {
+                groups.push((around(balls), first as u32..shadows.balls.len() as u32));
             }
         }
+        shadows.index = Index::Groups(groups);
         shadows
+    }
+
+    fn none(lamp: Point3<f64>, index: Index) -> Self {
+        Self { lamp, shapes: Vec::new(), solids: Vec::new(), balls: Vec::new(), index }
+    }
+
+    fn add<'a>(&mut self, solids: impl Iterator<Item = &'a Shape>) {
+        for solid in solids {
+            let (centre, radius) = solid.bound();
+            self.shapes.push(*solid);
+            self.solids.push(solid.seen_from(&self.lamp));
+            self.balls.push((centre - self.lamp, radius));
+        }
     }
 
     /// True if something stands in the way from the lamp to a point.
     pub fn on(&self, way: &Vector3<f64>) -> bool {
-        let mut numbers = self.within(cell(way, self.side) as usize).iter();
-        numbers.any(|n| self.solids[*n as usize].meet(way).is_some_and(|t| t < 1.0))
+        match &self.index {
+            Index::Cells(cells) => cells.on_way(way).iter().any(|number| self.is_in(*number, way)),
+            Index::Groups(groups) => {
+                let bundle = Bundle::new(*way, *way);
+                let near = groups.iter().filter(|(ball, _)| bundle.reaches(ball));
+                near.flat_map(|(_, numbers)| numbers.clone()).any(|number| self.is_in(number, way))
+            }
+        }
+    }
+
+    /// True if a solid stands in the way from the lamp to a point.
+    fn is_in(&self, number: u32, way: &Vector3<f64>) -> bool {
+        self.solids[number as usize].meet(way).is_some_and(|t| t < 1.0)
     }
 
     /// Writes the numbers of all solids that may stand in some way of a bundle, and perhaps of some
     /// others, to `found`.
     pub fn find(&self, bundle: &Bundle, found: &mut Vec<u32>) {
         found.clear();
-        match self.cells(bundle) {
-            Some((face, [left, right], [top, bottom])) => {
-                for row in top..=bottom {
-                    for column in left..=right {
-                        let cell = (face * self.side + row) * self.side + column;
-                        found.extend_from_slice(self.within(cell));
-                    }
+        match &self.index {
+            Index::Cells(cells) => {
+                if !cells.find(bundle, found) {
+                    found.extend(0..self.solids.len() as u32);
                 }
-                found.sort_unstable();
-                found.dedup();
             }
-            None => found.extend(0..self.solids.len() as u32),
+            Index::Groups(groups) => {
+                for (_, numbers) in groups.iter().filter(|(ball, _)| bundle.reaches(ball)) {
+                    found.extend(numbers.clone());
+                }
+            }
         }
         found.retain(|number| bundle.reaches(&self.balls[*number as usize]));
-    }
-
-    /// Returns the face that a bundle goes through, the columns and the rows of cells there, from the
-    /// first to the last; `None` for one through several faces or many cells.
-    fn cells(&self, bundle: &Bundle) -> Option<(usize, [usize; 2], [usize; 2])> {
-        let main = bundle.main_axis()?;
-        let columns = bundle.cells_along((main + 1) % 3, main, self.side);
-        let rows = bundle.cells_along((main + 2) % 3, main, self.side);
-        let count = (columns[1] - columns[0] + 1) * (rows[1] - rows[0] + 1);
-        let face = 2 * main + usize::from(bundle.high[main] < 0.0);
-        (count <= MOST_CELLS).then_some((face, columns, rows))
+        // The shape of a solid is dear to look at, but less so than all that its ball lets through.
+        if !found.is_empty()
+            && let Some(sides) = bundle.sides()
+        {
+            found.retain(|number| self.shapes[*number as usize].reaches(&self.lamp, &sides));
+        }
     }
 
     /// Returns the ways of interest, as bits, in which some of the numbered solids stand; they are
@@ -110,6 +150,65 @@ impl Shadows {
         let (low, high) = bounds(ways, interest);
         barred(self, numbers, &Bundle::new(low, high), ways, interest) & interest
     }
+}
+
+impl Cells {
+    fn new<'a>(
+        side: usize,
+        lamp: Point3<f64>,
+        solids: impl Iterator<Item = (Option<u16>, &'a Shape)> + Clone,
+    ) -> Self {
+        let mut cells = Self { side, numbers: Vec::new(), ends: Vec::new() };
+        for face in 0..6 {
+            let line = |number| line(number, side);
+            let row = |row| [on_face(face, -1.0, line(row)), on_face(face, 1.0, line(row))];
+            let column = |c| [on_face(face, line(c), -1.0), on_face(face, line(c), 1.0)];
+            // Most solids are on one face only.
+            let forward = on_face(face, 0.0, 0.0);
+            let sights = before(solids.clone(), &lamp, &forward, [row(0), row(side)]);
+            let sights = between(&sights, column(0), column(side));
+            for above in 0..side {
+                let strip = between(sights.iter().copied(), row(above), row(above + 1));
+                for left in 0..side {
+                    let cell = between(strip.iter().copied(), column(left), column(left + 1));
+                    cells.numbers.extend(cell.iter().map(|sight| sight.number));
+                    cells.ends.push(cells.numbers.len() as u32);
+                }
+            }
+        }
+        cells
+    }
+
+    /// Writes the numbers of the solids in the cells of a bundle; returns false for one through
+    /// several faces or many cells.
+    fn find(&self, bundle: &Bundle, found: &mut Vec<u32>) -> bool {
+        let Some((face, [left, right], [top, bottom])) = self.through(bundle) else { return false };
+        for row in top..=bottom {
+            for column in left..=right {
+                let cell = (face * self.side + row) * self.side + column;
+                found.extend_from_slice(self.within(cell));
+            }
+        }
+        found.sort_unstable();
+        found.dedup();
+        true
+    }
+
+    /// Returns the face that a bundle goes through, the columns and the rows of cells there, from the
+    /// first to the last; `None` for one through several faces or many cells.
+    fn through(&self, bundle: &Bundle) -> Option<(usize, [usize; 2], [usize; 2])> {
+        let main = bundle.main_axis()?;
+        let columns = bundle.cells_along((main + 1) % 3, main, self.side);
+        let rows = bundle.cells_along((main + 2) % 3, main, self.side);
+        let count = (columns[1] - columns[0] + 1) * (rows[1] - rows[0] + 1);
+        let face = 2 * main + usize::from(bundle.high[main] < 0.0);
+        (count <= MOST_CELLS).then_some((face, columns, rows))
+    }
+
+    /// The numbers of the solids in the cell that a way goes through.
+    fn on_way(&self, way: &Vector3<f64>) -> &[u32] {
+        self.within(cell(way, self.side) as usize)
+    }
 
     /// The numbers of the solids in a cell.
     fn within(&self, cell: usize) -> &[u32] {
@@ -118,16 +217,31 @@ impl Shadows {
     }
 }
 
+/// Returns a ball around some others, of which there is at least one.
+fn around(balls: &[Ball]) -> Ball {
+    let mut low = Vector3::repeat(f64::INFINITY);
+    let mut high = -low;
+    for (centre, radius) in balls {
+        low = low.inf(&centre.add_scalar(-radius));
+        high = high.sup(&centre.add_scalar(*radius));
+    }
+    let middle = 0.5 * (low + high);
+    let reaches = balls.iter().map(|(centre, radius)| (centre - middle).norm() + radius);
+    (middle, reaches.fold(0.0, f64::max))
+}
+
 /// Ways from a lamp whose ends lie in a box.
 #[derive(Clone, Copy, Debug)]
 pub struct Bundle {
     low: Vector3<f64>,
     high: Vector3<f64>,
-    /// The way to the middle of the box, and one over its squared length.
+    /// The way to the middle of the box, and one over its length.
     middle: Vector3<f64>,
-    per_square: f64,
-    /// No way is farther from the middle one at any part of its length, m.
+    per_length: f64,
+    /// No way ends farther from the middle one, m; on its way there it is nearer in proportion.
     radius: f64,
+    /// One over how much longer the middle way is than that, if the lamp is outside of the box.
+    per_rest: Option<f64>,
 }
 
 impl Bundle {
@@ -135,9 +249,10 @@ impl Bundle {
     pub fn new(low: Vector3<f64>, high: Vector3<f64>) -> Self {
         let middle = 0.5 * (low + high);
         // A lamp in the box has a middle way without length.
-        let per_square = middle.norm_squared().max(SLACK_M * SLACK_M).recip();
+        let length = middle.norm().max(SLACK_M);
         let radius = 0.5 * (high - low).norm() + SLACK_M;
-        Self { low, high, middle, per_square, radius }
+        let per_rest = (length > radius + SLACK_M).then(|| (length - radius).recip());
+        Self { low, high, middle, per_length: length.recip(), radius, per_rest }
     }
 
     /// Returns the axis whose face of the cube all ways go through; `None` if there are several.
@@ -152,12 +267,35 @@ impl Bundle {
     /// of a main axis.
     fn cells_along(&self, axis: usize, main: usize, side: usize) -> [usize; 2] {
         let half = 0.5 * side as f64;
+        self.slopes(axis, main).map(|at| ((at * half + half).max(0.0) as usize).min(side - 1))
+    }
+
+    /// Returns the least and the largest slope of the ways along an axis, per length along the main one.
+    fn slopes(&self, axis: usize, main: usize) -> [f64; 2] {
         // What is nearer along the main axis lies farther out on the face.
         let near_m = self.near_m(main);
         let far_m = self.far_m(main);
         let from = self.low[axis] / if self.low[axis] < 0.0 { near_m } else { far_m };
         let to = self.high[axis] / if self.high[axis] > 0.0 { near_m } else { far_m };
-        [from - SLACK, to + SLACK].map(|at| ((at * half + half).max(0.0) as usize).min(side - 1))
+        [from - SLACK, to + SLACK]
+    }
+
+    /// Returns the inward normals of four planes through the lamp between which all ways are; `None` if
+    /// they go through several faces of the cube.
+    fn sides(&self) -> Option<[Vector3<f64>; 4]> {
+        let main = self.main_axis()?;
+        let sign = if self.high[main] < 0.0 { -1.0 } else { 1.0 };
+        let mut sides = [Vector3::zeros(); 4];
+        for (pair, axis) in sides.chunks_exact_mut(2).zip([(main + 1) % 3, (main + 2) % 3]) {
+            for ((side, slope), inward) in
+                pair.iter_mut().zip(self.slopes(axis, main)).zip([1.0, -1.0])
+            {
+                side[axis] = inward;
+                side[main] = -inward * sign * slope;
+                side.normalize_mut();
+            }
+        }
+        Some(sides)
     }
 
     /// Returns the largest distance of an end from the lamp along an axis, m.
@@ -172,10 +310,15 @@ impl Bundle {
     }
 
     /// Returns false if a ball is beside all ways.
-    fn reaches(&self, (centre, radius): &(Vector3<f64>, f64)) -> bool {
-        let part = (dot(centre, &self.middle) * self.per_square).clamp(0.0, 1.0);
+    #[inline(always)]
+    fn reaches(&self, (centre, radius): &Ball) -> bool {
+        let along = dot(centre, &self.middle) * self.per_length;
+        // Ways spread from the lamp on: this is the last part of them that may touch the ball.
+        let last =
+            self.per_rest.map_or(1.0, |per_rest| ((along + radius) * per_rest).clamp(0.0, 1.0));
+        let part = (along * self.per_length).clamp(0.0, last);
         let away = centre - self.middle * part;
-        let reach = radius + self.radius;
+        let reach = radius + self.radius * last + SLACK_M;
         dot(&away, &away) <= reach * reach
     }
 }
@@ -342,23 +485,25 @@ mod tests {
             side in 1..40usize, size_m in 0.0..0.5f64,
         ) {
             let lamp = Point3::new(0.3, -0.2, 0.5);
-            let shadows = Shadows::new(side, lamp, solids.iter().map(|solid| (None, solid)));
+            let still = Shadows::still(side, lamp, solids.iter().map(|solid| (None, solid)));
+            let moving = Shadows::moving(lamp, solids.chunks(3).map(|object| object.iter()));
             let ways: Vec<_> = points.into_iter().map(|point| Point3::from(point) - lamp).collect();
             let barred = |way: &Vector3<f64>| {
                 solids.iter().any(|s| s.meet(&lamp, way).is_some_and(|t| t < 1.0))
             };
             for way in &ways {
-                prop_assert_eq!(shadows.on(way), barred(way));
+                prop_assert_eq!([still.on(way), moving.on(way)], [barred(way); 2]);
             }
             // Ways in all directions, and to a patch like those behind a tile of an image.
             let size_m = size_m * size_m;
             let near = |way: &Vector3<f64>| ways[0] + size_m * way;
             let patch: Vec<_> = ways.iter().map(near).collect();
             let mut found = Vec::new();
-            for ways in [ways, patch] {
+            let both = [ways, patch];
+            for (ways, shadows) in both.iter().flat_map(|ways| [(ways, &still), (ways, &moving)]) {
                 let mut low = Vector3::repeat(f64::INFINITY);
                 let mut high = -low;
-                for way in &ways {
+                for way in ways {
                     low = low.inf(way);
                     high = high.sup(way);
                 }
@@ -400,12 +545,16 @@ mod tests {
         let at = |y: f64| solid((0, [2.0, y, 0.0], [0.0; 3]));
         let solids = [at(-2.0), at(0.0), at(2.0), solid((0, [5.0, 0.0, 0.0], [0.0; 3]))];
         let lamp = Point3::origin();
-        let shadows = Shadows::new(FINE, lamp, solids.iter().map(|solid| (None, solid)));
+        let shadows = Shadows::still(SIDE, lamp, solids.iter().map(|solid| (None, solid)));
         let patch = Bundle::new(Vector3::new(4.0, -0.1, -0.1), Vector3::new(4.0, 0.1, 0.1));
         let mut found = vec![7];
         shadows.find(&patch, &mut found);
         assert_eq!(found, [1], "what stands behind the patch does not count, either");
-        let (face, columns, rows) = shadows.cells(&patch).unwrap();
-        assert_eq!((face, columns, rows), (0, [15, 16], [15, 16]));
+        let Index::Cells(cells) = &shadows.index else { panic!("what stands still has cells") };
+        let through = cells.through(&patch);
+        assert_eq!(through, Some((0, [15, 16], [15, 16])));
+        let moving = Shadows::moving(lamp, solids.chunks(2).map(|object| object.iter()));
+        moving.find(&patch, &mut found);
+        assert_eq!(found, [1]);
     }
 }

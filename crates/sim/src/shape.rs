@@ -6,6 +6,8 @@ use crate::lanes::{LANES, Lanes, Vectors, dot, product, transposed_product};
 use crate::material::Material;
 use crate::seen::SolidView;
 
+/// Room for rounding, m.
+const SLACK_M: f64 = 1e-6;
 /// Half a side from which on a flat side is large, m.
 const SLAB_M: f64 = 0.3;
 
@@ -128,6 +130,16 @@ impl Shape {
     pub fn is_behind(&self, eye: &Point3<f64>, normal: &Vector3<f64>) -> bool {
         let ahead = normal.dot(&(self.ball.0 - eye));
         ahead < 0.0 && ahead * ahead > self.ball.1
+    }
+
+    /// Returns true if parts of it are on the sides of some planes through an eye that unit vectors point
+    /// to.
+    pub fn reaches(&self, eye: &Point3<f64>, normals: &[Vector3<f64>]) -> bool {
+        let way = self.origin - eye;
+        // The ball around a solid is a cheap question to ask first.
+        normals.iter().all(|normal| {
+            !self.is_behind(eye, normal) && normal.dot(&way) + self.extent(normal) > -SLACK_M
+        })
     }
 
     /// Returns the extent of the solid from its origin along a unit vector (its support function),

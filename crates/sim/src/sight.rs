@@ -6,9 +6,6 @@ use nalgebra::{Point3, Vector3};
 use crate::seen::SolidView;
 use crate::shape::Shape;
 
-/// Room for rounding, m.
-const SLACK_M: f64 = 1e-6;
-
 /// A solid before an eye.
 pub struct SightedSolid<'a> {
     /// Its number among all solids.
@@ -21,39 +18,31 @@ pub struct SightedSolid<'a> {
     pub seen: SolidView,
     /// Nothing of it is closer to the eye along the optical axis, m.
     pub nearest: f64,
-    /// From the eye to its origin.
-    way: Vector3<f64>,
     eye: Point3<f64>,
 }
 
-impl SightedSolid<'_> {
-    /// True if a part of it is on the side of a plane through the eye that the
-    /// unit vector points to.
-    fn reaches(&self, normal: &Vector3<f64>) -> bool {
-        // The ball around a solid is a cheap question to ask first.
-        !self.shape.is_behind(&self.eye, normal)
-            && normal.dot(&self.way) + self.shape.extent(normal) > -SLACK_M
-    }
-}
-
-/// All solids that are not behind an eye that looks along the unit vector
-/// `forward`, nearest first.
+/// Returns the solids that are not behind an eye which looks along the unit vector `forward`, and reach
+/// between two planes through it, each given by two rays; nearest first.
 pub fn before<'a>(
     solids: impl Iterator<Item = (Option<u16>, &'a Shape)>,
     eye: &Point3<f64>,
     forward: &Vector3<f64>,
+    [one, other]: [[Vector3<f64>; 2]; 2],
 ) -> Vec<SightedSolid<'a>> {
-    let mut sights = Vec::new();
+    let normals = [*forward, inward(&one, &other[0]), inward(&other, &one[0])];
+    let mut found = Vec::new();
     for (number, (person, shape)) in (0..).zip(solids) {
-        let way = shape.origin - eye;
-        let nearest = forward.dot(&way) - shape.extent(&-forward);
-        let seen = shape.seen_from(eye);
-        let sight = SightedSolid { number, person, shape, seen, nearest, way, eye: *eye };
-        if sight.reaches(forward) {
-            sights.push(sight);
+        if shape.reaches(eye, &normals) {
+            let nearest = forward.dot(&(shape.origin - eye)) - shape.extent(&-forward);
+            found.push((nearest, number, person, shape));
         }
     }
-    sights.sort_by(|a, b| a.nearest.total_cmp(&b.nearest));
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut sights = Vec::with_capacity(found.len());
+    for (nearest, number, person, shape) in found {
+        let seen = shape.seen_from(eye);
+        sights.push(SightedSolid { number, person, shape, seen, nearest, eye: *eye });
+    }
     sights
 }
 
@@ -68,7 +57,7 @@ where
     'a: 's,
 {
     let normals = [inward(&one, &other[0]), inward(&other, &one[0])];
-    sights.into_iter().filter(|sight| normals.iter().all(|n| sight.reaches(n))).collect()
+    sights.into_iter().filter(|sight| sight.shape.reaches(&sight.eye, &normals)).collect()
 }
 
 fn inward(plane: &[Vector3<f64>; 2], inside: &Vector3<f64>) -> Vector3<f64> {

@@ -58,7 +58,7 @@ const ROBOT_M: f64 = 0.5;
 const GOES_M: f64 = 0.6;
 /// Rays in so many directions, and at these heights, m, feel for things around
 /// the robot.
-const FEELERS: u32 = 48;
+const FEELERS: usize = 48;
 const FEELERS_M: [f64; 4] = [0.15, 0.45, 0.8, 1.2];
 /// Half the distance of the places on which the robot stands, m: it tilts little by little at the
 /// ends of a ramp.

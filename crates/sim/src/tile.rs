@@ -35,8 +35,10 @@ pub struct SortedTile {
     used: usize,
     /// Batches of the same solid follow each other.
     entries: Vec<Entry>,
-    /// Rows in which not all pixels show the same solid, by their numbers.
-    rows: Vec<(u8, TileRow)>,
+    /// Rows in which not all pixels show the same solid, with the batch that holds each.
+    rows: Vec<(u8, u32)>,
+    /// Those of them with pixels that show nothing.
+    open_rows: Vec<u8>,
     /// Pixels of these rows, row by row, and by their solids.
     pixels: Vec<Pixel>,
     by_solid: Vec<Pixel>,
@@ -61,15 +63,7 @@ struct Pixel {
     column: u8,
 }
 
-/// A row of rays.
-#[derive(Clone, Copy)]
-struct TileRow {
-    rays: Vectors,
-    points: Vectors,
-    t: Lanes,
-}
-
-/// Rays that meet the same solid.
+/// Rays that meet the same solid, or those of a row that do not.
 #[derive(Clone)]
 pub struct Batch {
     /// Lanes in use, from the first on.
@@ -106,16 +100,16 @@ impl Tile {
         tile.used = 0;
         tile.entries.clear();
         tile.rows.clear();
+        tile.open_rows.clear();
         tile.pixels.clear();
         for row in 0..rows {
             let batch = tile.next_batch();
             rays(row, &mut batch.rays);
-            let met = first(solids, &batch.rays);
+            let (met, all_alike) = first(solids, &batch.rays);
             points(eye, &batch.rays, &met.t, &mut batch.points);
             batch.t = met.t;
             let solid = met.number[0];
-            let is_whole = columns == LANES && met.number == [solid; LANES] && solid != Met::NONE;
-            if is_whole {
+            if columns == LANES && all_alike && solid != Met::NONE {
                 batch.count = LANES;
                 batch.row = Some(row as u8);
                 tile.keep_batch(solid as u32);
@@ -126,9 +120,9 @@ impl Tile {
         tile.sort();
     }
 
-    /// Returns the rows in which not all pixels show the same solid.
-    pub fn mixed_rows(&self) -> impl Iterator<Item = usize> {
-        self.sorted.rows.iter().map(|(number, _)| usize::from(*number))
+    /// Returns the rows with pixels that show nothing.
+    pub fn open_rows(&self) -> impl Iterator<Item = usize> {
+        self.sorted.open_rows.iter().map(|number| usize::from(*number))
     }
 
     /// Returns the parts of the tile that are used together.
@@ -177,13 +171,17 @@ impl SortedTile {
 
     /// Puts the row of the next batch aside, whose pixels show several solids.
     fn mix(&mut self, row: u8, numbers: &[u64]) {
-        let Batch { rays, points, t, .. } = &self.batches[self.used];
         let place = self.rows.len() as u8;
-        self.rows.push((row, TileRow { rays: *rays, points: *points, t: *t }));
+        self.rows.push((row, self.used as u32));
+        self.used += 1;
+        let pixels = self.pixels.len();
         for (column, number) in (0..).zip(numbers) {
             if *number != Met::NONE {
                 self.pixels.push(Pixel { solid: *number as u32, row: place, column });
             }
+        }
+        if self.pixels.len() < pixels + LANES {
+            self.open_rows.push(row);
         }
     }
 
@@ -193,9 +191,10 @@ impl SortedTile {
         let pixels = std::mem::take(&mut self.by_solid);
         for same in pixels.chunk_by(|one, next| one.solid == next.solid) {
             for part in same.chunks(LANES) {
-                let rows = std::mem::take(&mut self.rows);
-                self.next_batch().gather(part, &rows);
-                self.rows = rows;
+                self.next_batch();
+                // Rows that were put aside lie before it.
+                let (before, next) = self.batches.split_at_mut(self.used);
+                next[0].gather(part, &self.rows, before);
                 self.keep_batch(part[0].solid);
             }
         }
@@ -250,11 +249,12 @@ impl Batch {
         &self.places[..self.count]
     }
 
-    fn gather(&mut self, pixels: &[Pixel], rows: &[(u8, TileRow)]) {
+    fn gather(&mut self, pixels: &[Pixel], rows: &[(u8, u32)], batches: &[Self]) {
         self.count = pixels.len();
         self.row = None;
         for (lane, pixel) in pixels.iter().enumerate() {
-            let (number, row) = &rows[usize::from(pixel.row)];
+            let (number, batch) = &rows[usize::from(pixel.row)];
+            let row = &batches[*batch as usize];
             let column = usize::from(pixel.column);
             self.places[lane] = [*number, pixel.column];
             self.rays.set(lane, &row.rays.at(column));
@@ -264,9 +264,10 @@ impl Batch {
     }
 }
 
-/// The first solid that each ray of depth one meets, by its place among solids that are sorted.
+/// The first solid that each ray of depth one meets, by its place among solids that are sorted; and
+/// true if it is the same for all of them.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn first(sights: &[&SightedSolid<'_>], rays: &Vectors) -> Met {
+fn first(sights: &[&SightedSolid<'_>], rays: &Vectors) -> (Met, bool) {
     let mut met = Met::NOTHING;
     for (number, sight) in (0..).zip(sights) {
         if !met.reaches(sight.nearest) {
@@ -274,5 +275,9 @@ fn first(sights: &[&SightedSolid<'_>], rays: &Vectors) -> Met {
         }
         sight.seen.shorten(rays, sight.nearest, number, &mut met);
     }
-    met
+    let mut differing = 0;
+    for lane in 0..LANES {
+        differing |= met.number[lane] ^ met.number[0];
+    }
+    (met, differing == 0)
 }

@@ -85,7 +85,14 @@ impl Stage {
     }
 
     fn shadows(&self) -> &[Shadows] {
-        self.shadows.get_or_init(|| shadows(shadow::FINE, &self.lamps, &self.objects))
+        self.shadows.get_or_init(|| {
+            let mut shadows = Vec::new();
+            for lamp in &self.lamps {
+                let casters = casters(&self.objects).flatten().map(|solid| (None, solid));
+                shadows.push(Shadows::still(shadow::SIDE, lamp.at, casters));
+            }
+            shadows
+        })
     }
 }
 
@@ -316,8 +323,10 @@ impl World {
 
     /// Returns the shadows around each lamp: those of the stage, and those of people.
     fn shadows(&self) -> impl Iterator<Item = [&Shadows; 2]> {
-        let people =
-            self.shadows.get_or_init(|| shadows(shadow::COARSE, &self.stage.lamps, &self.people));
+        let people = self.shadows.get_or_init(|| {
+            let lamps = self.stage.lamps.iter();
+            lamps.map(|lamp| Shadows::moving(lamp.at, casters(&self.people))).collect()
+        });
         self.stage.shadows().iter().zip(people).map(|(stage, people)| [stage, people])
     }
 }
@@ -353,11 +362,12 @@ fn left_over(infrared: f64, sun_lux: f64) -> f64 {
     infrared / (1.0 + sun_lux / WASHED_OUT_LUX)
 }
 
-/// Returns the shadows that objects throw, for each lamp; glass throws none.
-fn shadows(side: usize, lamps: &[Lamp], objects: &[Object]) -> Vec<Shadows> {
-    let casters = objects.iter().filter(|object| object.casts_shadow).flat_map(Object::solids);
-    let casters = casters.filter(|(_, solid)| solid.material.passes == 0.0);
-    lamps.iter().map(|lamp| Shadows::new(side, lamp.at, casters.clone())).collect()
+/// Returns the solids of each object that throw shadows; glass throws none.
+fn casters(
+    objects: &[Object],
+) -> impl Iterator<Item = impl Iterator<Item = &Shape> + Clone> + Clone {
+    let casters = objects.iter().filter(|object| object.casts_shadow);
+    casters.map(|object| object.shapes.iter().filter(|solid| solid.material.passes == 0.0))
 }
 
 /// Illuminance by the light from everywhere, of surfaces with these normals.

@@ -1,6 +1,7 @@
 //! Free distance around the robot, and the approacher of a scene.
 
 use std::f64::consts::TAU;
+use std::sync::LazyLock;
 
 use nalgebra::{Isometry3, Point2, Point3, Vector2, Vector3};
 
@@ -10,6 +11,14 @@ use crate::footprint::{Gap, Outline};
 use crate::shape::Shape;
 use crate::slice::Slice;
 use crate::world::{self, Object};
+
+/// Directions in which rays feel for things.
+static FEELS: LazyLock<[Vector3<f64>; FEELERS]> = LazyLock::new(|| {
+    std::array::from_fn(|i| {
+        let angle = TAU * i as f64 / FEELERS as f64;
+        Vector3::new(angle.cos(), angle.sin(), 0.0)
+    })
+});
 
 impl Simulation {
     /// Returns the free distance around the robot at its present place: around its footprint, or
@@ -42,10 +51,8 @@ impl Simulation {
             Slice::new(solids, from, &Vector3::z())
         });
         let things = slices.into_iter().flat_map(move |slice| {
-            (0..FEELERS).map(move |i| {
-                let angle = TAU * f64::from(i) / f64::from(FEELERS);
-                let ray = Vector3::new(angle.cos(), angle.sin(), 0.0);
-                let away_m = slice.first(&ray).map_or(f64::INFINITY, |(t, _)| t);
+            FEELS.iter().map(move |ray| {
+                let away_m = slice.first(ray).map_or(f64::INFINITY, |(t, _)| t);
                 outline.gap(&self.robot.pose, &ray.xy(), away_m, 0.0)
             })
         });
