@@ -12,16 +12,17 @@ macro_rules! scenes {
 /// The scenes of `configs/scenes`.
 const BUILT_IN: &[(&str, &str)] = scenes! {
     "among-circular" "among-clutter" "among-corridor" "among-crossing" "among-doorway" "approach"
-    "behind-glass" "behind-glass-sonar" "cafeteria" "cafeteria-high" "cheap-laser" "coat-off" "corridor"
-    "corridor-high" "crossing" "crossing-four" "crossing-hidden" "crossing-oblique"
+    "behind-glass" "behind-glass-sonar" "cafeteria" "cafeteria-high" "cheap-laser" "coat-off"
+    "corridor" "corridor-high" "crossing" "crossing-four" "crossing-hidden" "crossing-oblique"
     "crossing-parallel" "crossing-three" "crowd" "daylight" "demo" "empty-clutter" "empty-real"
     "follow-alike" "follow-around" "follow-between" "follow-child" "follow-coat-stand"
     "follow-corner" "follow-crowd" "follow-crowd-ten" "follow-doors" "follow-dropped" "follow-fast"
     "follow-gets-up" "follow-latency" "follow-passing" "follow-ramp" "follow-return-15"
     "follow-return-30" "follow-return-5" "follow-return-two" "follow-step-in" "follow-swap"
     "follow-tilt" "follow-turns" "following" "full-occlusion" "lidar-rings" "lidar-rosette"
-    "light-changes" "mirrors" "office" "office-high" "omni-hat" "omni-moving" "omni-people" "omni-room" "sample"
-    "square-walk" "static-high" "stereo-follow-passing" "stereo-hall" "turntable"
+    "light-changes" "mirrors" "office" "office-high" "omni-hat" "omni-moving" "omni-people"
+    "omni-room" "sample" "square-walk" "static-high" "stereo-follow-passing" "stereo-hall"
+    "turntable"
 };
 
 /// Folder that the names stand for.
