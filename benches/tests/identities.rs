@@ -9,8 +9,23 @@ type Row = (u32, u32, u32, f64, &'static str);
 /// A track in a frame: frame, ID, column of the box; without a column it is predicted.
 type Seen = (u32, u32, Option<u32>);
 
-/// Returns the lines of the table for frames that are so far apart; `None` where there is no Python.
+/// Returns the lines of the table of events for frames that are so far apart; `None` where there is no
+/// Python.
 fn events(people: &[Row], tracks: &[Seen], step_ms: u64) -> Option<Vec<String>> {
+    let text = printed(people, tracks, step_ms)?;
+    let (events, _) = text.split_once(" switches, ").unwrap();
+    Some(cells(events))
+}
+
+/// Returns the cells of the rows of a table, without the name of the log.
+fn cells(table: &str) -> Vec<String> {
+    let rows = table.lines().filter(|line| line.starts_with("| ") && !line.starts_with("| log"));
+    let rows = rows.filter(|line| !line.starts_with("| ---"));
+    rows.map(|line| line.split(" | ").skip(1).collect::<Vec<_>>().join("; ")).collect()
+}
+
+/// Returns what the script prints; `None` where there is no Python.
+fn printed(people: &[Row], tracks: &[Seen], step_ms: u64) -> Option<String> {
     let folder = tempfile::tempdir().unwrap();
     let mut truth = String::from("frame,id,ub_x,ub_y,ub_w,ub_h,visible,occluder\n");
     for (frame, id, column, visible, occluder) in people {
@@ -34,10 +49,7 @@ fn events(people: &[Row], tracks: &[Seen], step_ms: u64) -> Option<Vec<String>> 
         Command::new("python3").args(["-B", script]).arg(truth_path).arg(folder.path()).output();
     let output = output.ok()?;
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let text = String::from_utf8(output.stdout).unwrap();
-    let rows = text.lines().filter(|line| line.starts_with("| ") && !line.starts_with("| log"));
-    let rows = rows.filter(|line| !line.starts_with("| ---"));
-    Some(rows.map(|line| line.split(" | ").skip(1).collect::<Vec<_>>().join("; ")).collect())
+    Some(String::from_utf8(output.stdout).unwrap())
 }
 
 /// Returns the kind of the switch of a person who is so in the frame between; `None` without Python.
@@ -89,4 +101,18 @@ fn an_id_is_inherited_from_a_track_or_by_recognition() {
     assert_eq!(found, [format!("{event}; of a vague track |")]);
     let ended = [(1, 5, Some(100)), (3, 5, Some(120))];
     assert_eq!(events(&people, &ended, 100).unwrap(), [format!("{event}; recognised wrongly |")]);
+}
+
+#[test]
+fn missed_people_are_counted_by_what_hides_them() {
+    let people = [
+        (1, 1, 100, 1.0, "0"),
+        (2, 1, 0, 0.5, "border"),
+        (3, 1, 100, 0.5, "2"),
+        (4, 1, 100, 0.9, "2"),
+        (5, 1, 100, 1.0, "0"),
+    ];
+    let Some(text) = printed(&people, &[(1, 5, Some(100))], 100) else { return };
+    let (_, missed) = text.split_once(" switches, ").unwrap();
+    assert_eq!(cells(missed), ["5; 4; 1; 1; 2 |"]);
 }
