@@ -16,8 +16,8 @@ const PLACEHOLDERS: &[&str] = &[
     "| what it says | what is done instead",
 ];
 
-/// The call that checks a plugin against the promises of its kind.
-const CONFORMANCE: &str = "check_all(";
+/// The calls that check a plugin against the promises of its kind.
+const CONFORMANCE: [&str; 2] = ["assert_conforms(", "check_all("];
 
 /// Page that lists all registered plugins with their settings.
 const LIST: &str = "docs/reference/config-keys.md";
@@ -49,7 +49,7 @@ pub fn check(workspace: &Workspace, metadata: &Metadata) -> Result<Vec<String>> 
             complaints.push(format!("{folder} is not listed in crates/catalog"));
         }
         if !tests_conformance(workspace, &folder)? {
-            complaints.push(format!("no test of {folder} calls {CONFORMANCE}"));
+            complaints.push(format!("no test of {folder} calls {}", CONFORMANCE.join(" or ")));
         }
         if !workspace.root().join(&folder).join("README.md").exists() {
             complaints.push(format!("{folder} has no README.md"));
@@ -119,7 +119,8 @@ fn tests_conformance(workspace: &Workspace, folder: &str) -> Result<bool> {
         let is_source = file.starts_with(folder) && file.extension().is_some_and(|e| e == "rs");
         if is_source {
             let text = workspace.read(&file)?;
-            if text.contains("tagalong_conformance::") && text.contains(CONFORMANCE) {
+            let is_called = CONFORMANCE.iter().any(|call| text.contains(call));
+            if text.contains("tagalong_conformance::") && is_called {
                 return Ok(true);
             }
         }
