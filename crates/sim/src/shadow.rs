@@ -160,17 +160,23 @@ impl Cells {
     ) -> Self {
         let mut cells = Self { side, numbers: Vec::new(), ends: Vec::new() };
         for face in 0..6 {
-            let line = |number| line(number, side);
-            let row = |row| [on_face(face, -1.0, line(row)), on_face(face, 1.0, line(row))];
-            let column = |c| [on_face(face, line(c), -1.0), on_face(face, line(c), 1.0)];
             // Most solids are on one face only.
             let forward = on_face(face, 0.0, 0.0);
-            let sights = before(solids.clone(), &lamp, &forward, [row(0), row(side)]);
-            let sights = between(&sights, column(0), column(side));
+            let sights = before(
+                solids.clone(),
+                &lamp,
+                &forward,
+                [row_ends(face, -1.0), row_ends(face, 1.0)],
+            );
+            let sights = between(&sights, column_ends(face, -1.0), column_ends(face, 1.0));
             for above in 0..side {
-                let strip = between(sights.iter().copied(), row(above), row(above + 1));
+                let top = row_ends(face, line(above, side));
+                let bottom = row_ends(face, line(above + 1, side));
+                let strip = between(sights.iter().copied(), top, bottom);
                 for left in 0..side {
-                    let cell = between(strip.iter().copied(), column(left), column(left + 1));
+                    let start = column_ends(face, line(left, side));
+                    let end = column_ends(face, line(left + 1, side));
+                    let cell = between(strip.iter().copied(), start, end);
                     cells.numbers.extend(cell.iter().map(|sight| sight.number));
                     cells.ends.push(cells.numbers.len() as u32);
                 }
@@ -423,6 +429,16 @@ fn on_face(face: usize, u: f64, v: f64) -> Vector3<f64> {
     point[(axis + 1) % 3] = u;
     point[(axis + 2) % 3] = v;
     point
+}
+
+/// The ends of a line of a face between two rows of cells.
+fn row_ends(face: usize, v: f64) -> [Vector3<f64>; 2] {
+    [on_face(face, -1.0, v), on_face(face, 1.0, v)]
+}
+
+/// The ends of a line of a face between two columns of cells.
+fn column_ends(face: usize, u: f64) -> [Vector3<f64>; 2] {
+    [on_face(face, u, -1.0), on_face(face, u, 1.0)]
 }
 
 /// The cell that a way goes through.
