@@ -297,16 +297,21 @@ mod tests {
         assert!(short > 2.0 * slow, "{short} {slow}");
     }
 
-    /// One step computed by hand: along the mean gradient, times the rate.
-    #[test]
-    fn a_step_of_back_propagation_is_that_of_the_formula() {
-        let network = Network {
+    /// Returns a network of one input and one hidden neuron, with this constant added to its output.
+    fn small_network(constant: f64) -> Network {
+        Network {
             mean: vec![0.0],
             scale: vec![1.0],
             target: [0.0, 1.0],
             hidden: vec![vec![0.5, -0.25]],
-            output: vec![2.0, 0.125],
-        };
+            output: vec![2.0, constant],
+        }
+    }
+
+    /// One step computed by hand: along the mean gradient, times the rate.
+    #[test]
+    fn a_step_of_back_propagation_is_that_of_the_formula() {
+        let network = small_network(0.125);
         let step = Fit { steps: 1, ..DESCENT };
         let (_, after) = step.descend(network, &[vec![1.0], vec![-2.0]], &[1.0, 0.5]);
         let mut slopes = [0.0; 4];
@@ -326,13 +331,7 @@ mod tests {
     /// Two targets of one input leave an error of 1, of which the first step can take a millionth.
     #[test]
     fn after_a_step_that_gains_too_little_there_is_no_other() {
-        let start = Network {
-            mean: vec![0.0],
-            scale: vec![1.0],
-            target: [0.0, 1.0],
-            hidden: vec![vec![0.5, -0.25]],
-            output: vec![2.0, 1e-3 - 2.0 * 0.25_f64.tanh()],
-        };
+        let start = small_network(1e-3 - 2.0 * 0.25_f64.tanh());
         let [one, nine] = [1, 9].map(|steps| {
             let fit = Fit { decay: 0.0, steps, ..FIT };
             fit.descend(start.clone(), &[vec![1.0], vec![1.0]], &[1.0, -1.0]).1
@@ -344,13 +343,7 @@ mod tests {
     /// Without an error there is the decay alone: 0.8 for two samples and four weights.
     #[test]
     fn a_step_without_errors_makes_the_weights_smaller() {
-        let network = Network {
-            mean: vec![0.0],
-            scale: vec![1.0],
-            target: [0.0, 1.0],
-            hidden: vec![vec![0.5, -0.25]],
-            output: vec![2.0, 0.125],
-        };
+        let network = small_network(0.125);
         let before = weights_of(&network);
         let inputs = [vec![1.0], vec![-2.0]];
         let answers = inputs.each_ref().map(|x| network.answer(x));
