@@ -300,7 +300,7 @@ impl ObstacleMemory {
             if at.coords.norm() >= reach_m {
                 return false;
             }
-            if grid.is_something(at) {
+            if grid.has_points(at, ENOUGH) {
                 let seen = grid.heights_around(at);
                 let free = thing.heights.free(camera, depth, at, seen);
                 thing.free_s = if free.0 == 0 { 0.0 } else { thing.free_s + dt_s };
@@ -316,7 +316,7 @@ impl ObstacleMemory {
                 shows_floor(settings, camera, depth, at)
             } else {
                 // A few points at the edge of the image are not enough to see it, nor that it is gone.
-                !grid.has_points(at) && shows_past(camera, depth, at, thing.heights)
+                !grid.has_points(at, 1) && shows_past(camera, depth, at, thing.heights)
             };
             !is_gone && thing.unseen_s <= thing.kept_s(settings, footprint)
         });
@@ -592,14 +592,9 @@ impl Grid {
         Heights(self.around(at).iter().fold(0, |all, cell| all | self.heights[*cell].0))
     }
 
-    /// Returns true if an obstacle is here, or one cell away.
-    fn is_something(&self, at: &Point2<f64>) -> bool {
-        self.around(at).iter().any(|cell| self.points[*cell] >= ENOUGH)
-    }
-
-    /// Returns true if there is any point here, or one cell away.
-    fn has_points(&self, at: &Point2<f64>) -> bool {
-        self.around(at).iter().any(|cell| self.points[*cell] > 0)
+    /// Returns true if there are at least so many points here, or in a cell beside it.
+    fn has_points(&self, at: &Point2<f64>, least: u16) -> bool {
+        self.around(at).iter().any(|cell| self.points[*cell] >= least)
     }
 
     fn clear_around(&mut self, at: &Point2<f64>) {
