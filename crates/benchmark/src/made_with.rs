@@ -112,8 +112,6 @@ fn note(logs: &BTreeSet<&str>, pipelines: &[&str]) -> String {
 mod tests {
     use std::path::Path;
 
-    use tagalong_config::Registry;
-
     use super::super::plan::{planned_for_tests, sha256_of_file};
     use super::*;
 
@@ -128,8 +126,7 @@ mod tests {
     }
 
     fn names_of_file(file: &ConfigFile) -> Vec<String> {
-        let mut registry = Registry::default();
-        tagalong_catalog::register(&mut registry);
+        let registry = tagalong_catalog::registry();
         let (_, resolved) = file.pipeline(&registry, None).expect("a config");
         let hashes = recordings_of(file, resolved.values()).expect("the table");
         let recordings = table().recordings.into_iter();
