@@ -18,10 +18,12 @@ import time
 import urllib.error
 import urllib.request
 
-# Read when the first participant is created: lost packets, in thousandths.
+# Read when the first participant is created: lost packets, in thousandths, and the time between two
+# announcements of a participant. By default they are 8 s apart and count for 10 s, so that the bridge
+# forgets a participant, with all that it sends, for six seconds after one is lost.
 os.environ["CYCLONEDDS_URI"] = (
-    "<CycloneDDS><Domain><Internal><Test><XmitLossiness>10</XmitLossiness></Test></Internal>"
-    "</Domain></CycloneDDS>"
+    "<CycloneDDS><Domain><Discovery><SPDPInterval>2s</SPDPInterval></Discovery>"
+    "<Internal><Test><XmitLossiness>10</XmitLossiness></Test></Internal></Domain></CycloneDDS>"
 )
 
 from dataclasses import dataclass  # noqa: E402
