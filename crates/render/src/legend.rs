@@ -16,6 +16,7 @@ pub fn height_px(style: OverlayStyle) -> usize {
 }
 
 const MARGIN_PX: f64 = 6.0;
+const MARK_PX: f64 = 14.0;
 const WHITE: Ink = Ink::solid([235, 235, 235]);
 const QUIET: Ink = Ink::solid([190, 190, 190]);
 /// Colour of the examples, which is that of no track.
@@ -103,38 +104,41 @@ enum Sample {
 fn entries(scene: &OverlayData, style: OverlayStyle) -> Vec<(Sample, &'static str)> {
     if !style.is_debug() {
         return vec![
-            (Sample::Seen, "seen: ID and distance"),
+            (Sample::Seen, "seen: ID, distance (~ guess)"),
             (Sample::Predicted, "predicted"),
-            (Sample::Trail, "trail of 2 s"),
-            (Sample::Velocity, "position in 1 s"),
+            (Sample::Trail, "last 2 s"),
+            (Sample::Velocity, "place in 1 s"),
         ];
     }
     let sketch = scene.report.visualisation.as_ref().and_then(|shown| shown.downcast_ref());
     let has_particles = sketch.is_some_and(|sketch: &Sketch| !sketch.points.is_empty());
     let image = [
-        (Sample::Seen, "seen"),
+        (Sample::Seen, "seen (~ guess)"),
         (Sample::Predicted, "predicted"),
         (Sample::Tentative, "tentative"),
         (Sample::Dropped, "dropped, by test"),
         (Sample::Trail, "trail"),
     ];
-    let plan = [(Sample::Velocity, "position in 1 s"), (Sample::Ellipse, "2 sigma")];
+    let plan = [(Sample::Velocity, "place in 1 s"), (Sample::Ellipse, "2 sigma")];
     let particles = has_particles.then_some((Sample::Particles, "particles"));
     image.into_iter().chain(particles).chain(plan).collect()
 }
 
 /// Renders a mark and its meaning; returns the columns of both.
 fn draw_entry(canvas: &mut Canvas, at: Point2<f64>, sample: Sample, meaning: &str) -> f64 {
-    let side = 14.0;
-    let mark = Rect::new(at.x, at.y + 2.0, side, side);
+    let mark = Rect::new(at.x, at.y + 2.0, MARK_PX, MARK_PX);
     draw_sample(canvas, &mark, sample);
-    let text_at = Point2::new(at.x + side + 4.0, at.y);
-    let [width, _] = Lettering::Small.size_px(meaning);
+    let text_at = Point2::new(at.x + MARK_PX + 4.0, at.y);
     // An entry beyond the edge is left out instead of moved over the one before it.
-    if text_at.x + width <= canvas.width() as f64 {
+    if at.x + entry_px(meaning) <= canvas.width() as f64 {
         canvas.text(text_at, meaning, QUIET);
     }
-    side + 4.0 + width + 10.0
+    entry_px(meaning) + 10.0
+}
+
+/// Width of a mark with its meaning, pixels.
+fn entry_px(meaning: &str) -> f64 {
+    MARK_PX + 4.0 + Lettering::Small.size_px(meaning)[0]
 }
 
 fn draw_sample(canvas: &mut Canvas, mark: &Rect, sample: Sample) {
@@ -204,6 +208,19 @@ mod tests {
         assert_eq!(drive(&report), "   no target   0.42 m/s -0.10 rad/s: near");
         report.target = Some(TrackId(7));
         assert!(drive(&report).starts_with("   target 7   "));
+    }
+
+    #[test]
+    fn the_meaning_of_all_marks_and_of_a_tilde_fits_under_the_narrowest_picture() {
+        let scene = super::super::tests::scene(&[], Vec::new());
+        let entries = entries(&scene, OverlayStyle::default());
+        assert!(
+            entries.iter().any(|(_, meaning)| meaning.contains('~')),
+            "distances may be guesses"
+        );
+        let widths = entries.iter().map(|(_, meaning)| entry_px(meaning) + 10.0);
+        let all_px = MARGIN_PX + widths.sum::<f64>() - 10.0;
+        assert!(all_px <= 640.0, "{all_px}");
     }
 
     #[test]

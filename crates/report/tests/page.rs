@@ -3,6 +3,8 @@
 
 mod common;
 
+use std::collections::BTreeSet;
+
 use tagalong_eval::Scores;
 use tagalong_report::{
     Benchmark, EventRow, Outcome, PairSummary, Summary, TaskResult, Timings, Trajectory, csv, html,
@@ -252,6 +254,46 @@ fn means_are_over_logs_and_the_best_needs_all_of_them() {
     assert_eq!((one.logs, one.interval, one.p_value, one.is_clear()), (1, None, 1.0, false));
 }
 
+#[test]
+fn a_pipeline_of_fewer_logs_says_so_once_and_a_figure_of_fewer_still_beside_it() {
+    let mut benchmark = with_hota(&[("a", "x", 0.5), ("a", "y", 0.6), ("a", "z", 0.6)]);
+    benchmark.tasks.extend(with_hota(&[("b", "x", 0.5), ("b", "y", 0.6)]).tasks);
+    // On one log two seeds, of which both have an MOTA; the other log has none.
+    benchmark.tasks.extend(with_hota(&[("b", "x", 0.5)]).tasks);
+    for task in benchmark.tasks.iter_mut().filter(|task| task.pipeline == "b" && task.log == "x") {
+        task.image.as_mut().expect("figures in the image").mota = Some(0.25);
+    }
+    let page = html(&benchmark, None);
+    let results = page.split("id=\"results\"").nth(1).expect("the results");
+    let results = results.split("<details").next().expect("the first table");
+    let row = results.split("<tr").nth(3).expect("the second pipeline");
+    assert!(row.contains("3 / 3 <span class=\"fewer\">2 logs</span>"), "of three tasks: {row}");
+    assert_eq!(row.matches("2 logs").count(), 1, "{row}");
+    assert!(row.contains("0.250</span> <span class=\"fewer\">1 log</span>"), "{row}");
+}
+
+#[test]
+fn the_plans_of_a_log_without_truth_are_folded_and_take_no_room_from_others() {
+    let mut benchmark = two_by_three();
+    let logs: BTreeSet<String> = benchmark.tasks.iter().map(|task| task.log.clone()).collect();
+    let without = logs.first().expect("a log").clone();
+    assert_eq!(open_plans(&benchmark).len(), 2, "of two pipelines each");
+    for task in benchmark.tasks.iter_mut().filter(|task| task.log == without) {
+        task.truth.clear();
+    }
+    let open = open_plans(&benchmark);
+    assert!(open.len() == 2 && !open.contains(&without), "{open:?}");
+}
+
+/// The logs whose plans are open.
+fn open_plans(benchmark: &Benchmark) -> Vec<String> {
+    let page = html(benchmark, None);
+    let plans = page.split("<section id=\"floor\"").nth(1).expect("the plans");
+    let plans = plans.split("</section>").next().expect("their end");
+    let open = plans.split("<details class=\"print\" open><summary>").skip(1);
+    open.filter_map(|rest| rest.split('<').next()).map(ToOwned::to_owned).collect()
+}
+
 fn pair_of<'a>(summary: &'a Summary, a: &str, b: &str) -> &'a PairSummary {
     summary.pairs.iter().find(|p| p.a == a && p.b == b && p.figure == "image.HOTA").unwrap()
 }
@@ -381,7 +423,10 @@ fn thirty_pipelines_make_a_page_below_five_megabytes() {
     let page = html(&benchmark, Some(&common::timings(&benchmark)));
     assert!(page.len() < 5_000_000, "{} bytes", page.len());
     assert!(page.len() > 3_000_000, "{} bytes: the bounds are not reached", page.len());
-    assert_eq!(page.matches("class=\"pair print\"").count(), 10);
+    assert_eq!(page.matches("class=\"pair\"").count(), 10);
+    for folded in ["4 more pairs", "Miss rate on 2 more logs"] {
+        assert_eq!(page.matches(&format!("<summary>{folded}</summary>")).count(), 1, "{folded}");
+    }
     assert!(page.matches("class=\"moment\"").count() >= 20);
 }
 
@@ -480,7 +525,8 @@ fn all_that_are_equal_when_printed_are_best() {
 #[test]
 fn an_interval_in_a_cell_has_its_level() {
     let page = html(&two_by_three(), None);
-    assert!(page.contains("<span class=\"ends\">95\u{a0}%: "));
+    assert!(page.contains("<span class=\"ends\"><span class=\"level\">95\u{a0}%: "));
+    assert!(page.contains("below each its 95\u{a0}% interval"), "where the level has no room");
 }
 
 #[test]

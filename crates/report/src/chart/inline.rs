@@ -4,6 +4,9 @@ use super::{Axis, Scale, px};
 
 const WIDTH: f64 = 120.0;
 
+/// Width of the picture of an interval, which stands beside its value.
+const INTERVAL_WIDTH: f64 = 60.0;
+
 /// Renders a bar from zero for a cell of a table; `whisker` is a second, greater value. The numbers
 /// stand beside it, so it is hidden from screen readers.
 pub fn bar(value: f64, whisker: Option<f64>, most: f64) -> Markup {
@@ -24,13 +27,13 @@ pub fn bar(value: f64, whisker: Option<f64>, most: f64) -> Markup {
 
 /// Renders an estimate and its interval for a cell of a table, within the range of all.
 pub fn interval(estimate: f64, ends: Option<[f64; 2]>, range: [f64; 2]) -> Markup {
-    let axis = Axis::new(Scale::Linear, range, [6.0, WIDTH - 6.0]);
+    let axis = Axis::new(Scale::Linear, range, [6.0, INTERVAL_WIDTH - 6.0]);
     let Some(at) = axis.at(estimate) else { return html! {} };
     let ends = ends.and_then(|[low, high]| Some([axis.at(low)?, axis.at(high)?]));
     let zero = (range[0] < 0.0 && range[1] > 0.0).then(|| axis.at(0.0)).flatten();
     html! {
-        svg class="inline" viewBox="0 0 120 14" width="120" height="14" aria-hidden="true" {
-            line class="rail" x1="1" x2="119" y1="7" y2="7" {}
+        svg class="beside" viewBox="0 0 60 14" width="60" height="14" aria-hidden="true" {
+            line class="rail" x1="1" x2="59" y1="7" y2="7" {}
             @if let Some(zero) = zero {
                 line class="zero" x1=(px(zero)) x2=(px(zero)) y1="0" y2="14" {}
             }

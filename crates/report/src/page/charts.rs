@@ -8,8 +8,11 @@ use crate::chart::{Curve, Extent, Words, bar, key, miss_rate, plan, series_class
 use crate::figures::FEW_SCORES;
 use crate::model::TaskResult;
 
-/// Most plans that are open, by whole logs: with more the page would be long.
+/// Most plans that are open, by whole logs with a truth: with more the page would be long.
 const OPEN_PLANS: usize = 4;
+
+/// Most charts of miss rates that are not folded.
+const OPEN_CHARTS: usize = 4;
 
 impl Page<'_> {
     pub(super) fn miss_rates(&self) -> Option<Markup> {
@@ -25,7 +28,14 @@ impl Page<'_> {
             p class="legend" {
                 @for (series, name) in self.view.pipelines.iter().take(MOST_DRAWN).enumerate() { (key(series, name)) " " }
             }
-            div class="charts" { @for chart in &charts { (chart) } }
+            @let (open, folded) = charts.split_at(charts.len().min(OPEN_CHARTS));
+            div class="charts" { @for chart in open { (chart) } }
+            @if !folded.is_empty() {
+                details class="print" {
+                    summary { "Miss rate on " (counted(folded.len(), "more log")) }
+                    div class="charts" { @for chart in folded { (chart) } }
+                }
+            }
         })
     }
 
@@ -67,8 +77,11 @@ impl Page<'_> {
         let mut logs: Vec<Markup> = Vec::new();
         let mut drawn = 0;
         for log in &self.view.logs {
-            drawn += self.drawn(log).count();
-            logs.extend(self.plans_of(log, drawn <= OPEN_PLANS));
+            let has_truth = self.drawn(log).any(|task| !task.truth.is_empty());
+            if has_truth {
+                drawn += self.drawn(log).count();
+            }
+            logs.extend(self.plans_of(log, has_truth && drawn <= OPEN_PLANS));
         }
         (!logs.is_empty()).then(|| html! {
             p {
@@ -76,7 +89,7 @@ impl Page<'_> {
                 "in the odometry frame. A change of line along one person is an ID switch."
                 (self.of_the_best())
             }
-            @for log in &logs { (log) }
+            div class="folds" { @for log in &logs { (log) } }
         })
     }
 

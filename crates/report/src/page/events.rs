@@ -68,9 +68,11 @@ impl Page<'_> {
                 @if numbered.clone().count() <= MOST_UNFOLDED {
                     @for (number, task) in numbered { (self.events_of(number, task)) }
                 } @else {
-                    @for pipeline in &self.view.pipelines {
-                        @let of_pipeline = numbered.clone().filter(|(_, task)| task.pipeline == *pipeline);
-                        (self.events_of_pipeline(pipeline, of_pipeline.collect()))
+                    div class="folds" {
+                        @for pipeline in &self.view.pipelines {
+                            @let of_pipeline = numbered.clone().filter(|(_, task)| task.pipeline == *pipeline);
+                            (self.events_of_pipeline(pipeline, of_pipeline.collect()))
+                        }
                     }
                 }
                 @if more > 0 { p { "The events of " (counted(more, "task")) " of the last pipelines are in report.json." } }
@@ -112,12 +114,14 @@ impl Page<'_> {
                 }
             }
         };
-        table(
-            "Events by kind",
-            &html! { "Events by kind and pipeline, over all tasks. A miss is a time without a reported track, however many frames it lasts." },
-            &head,
-            &body,
-        )
+        let caption = html! { "Events by kind and pipeline, over all tasks. A miss is a time without a reported track, however many frames it lasts." };
+        let name = "Events by kind";
+        html! {
+            details class="print" open[self.view.pipelines.len() <= MOST_UNFOLDED] {
+                summary { (name) }
+                (table(name, &caption, &head, &body))
+            }
+        }
     }
 
     fn events_of(&self, number: usize, task: &TaskResult) -> Markup {

@@ -88,6 +88,7 @@ impl Page<'_> {
     fn headline_table(&self, place: ComparisonSpace) -> Markup {
         let figures: Vec<&Figure> = Figure::at(place).filter(|f| self.is_known(f, place)).collect();
         let most = self.summary.pipelines.iter().map(|p| p.done).max().unwrap_or(0);
+        let most_logs = self.summary.pipelines.iter().map(|p| logs_of(p, place)).max().unwrap_or(0);
         let head = html! {
             (column("Pipeline", None))
             (column("Done", Some("Tasks that ran to their end, of those planned")))
@@ -98,7 +99,7 @@ impl Page<'_> {
             @for summary in self.summary.pipelines.iter().filter(|p| !was_skipped(p)) {
                 tr.(series_class(self.series(&summary.pipeline))) data-series=(self.series(&summary.pipeline)) {
                     th scope="row" { (key(self.series(&summary.pipeline), &summary.pipeline)) }
-                    (done_cell(summary, most))
+                    (done_cell(summary, most, [logs_of(summary, place), most_logs]))
                     @if place == ComparisonSpace::Image { (people_cell(summary)) }
                     @for figure in &figures { (self.figure_cell(summary, figure, place)) }
                 }
@@ -106,7 +107,7 @@ impl Page<'_> {
         };
         let caption = html! {
             "Means over logs, " (place_where(place))
-            @if self.view.logs.len() as u64 >= LEAST_LOGS { ", with 95\u{a0}% intervals" }
+            @if self.view.logs.len() as u64 >= LEAST_LOGS { ", below each its 95\u{a0}% interval" }
             ". "
             span class="best" { "★ best" } " of the pipelines with the most logs."
         };
@@ -128,7 +129,8 @@ impl Page<'_> {
         let Some(estimate) = summary.figures.get(&key) else { return no_cell() };
         let all: Vec<&Estimate> =
             self.summary.pipelines.iter().filter_map(|p| p.figures.get(&key)).collect();
-        let most = all.iter().map(|e| e.logs).max().unwrap_or(0);
+        // That a pipeline has fewer logs than others stands in the column "Done", once for all figures.
+        let is_of_fewer = estimate.logs < logs_of(summary, place);
         // One picture per row is enough: that of the ranking figure.
         let picture = (figure.name == MAIN.name)
             .then(|| interval(estimate.mean, shown_interval(estimate), range(&all)));
@@ -136,11 +138,11 @@ impl Page<'_> {
             estimate.mean,
             &html! {
                 (starred(estimate.mean, figure.decimals, estimate.best))
+                @if is_of_fewer { " " span class="fewer" { (counted(estimate.logs, "log")) } }
+                @if let Some(picture) = picture { (picture) }
                 @if let Some(ends) = shown_interval(estimate).filter(|ends| informs(ends, figure.range)) {
                     " " (labelled_ends(ends, figure.decimals))
                 }
-                @if estimate.logs < most { span class="fewer" { (counted(estimate.logs, "log")) " only" } }
-                @if let Some(picture) = picture { (picture) }
             },
         )
     }
@@ -222,10 +224,20 @@ pub(super) fn figure_name(figure: &Figure) -> String {
     if figure.unit.is_empty() { name.to_owned() } else { format!("{name} [{}]", figure.unit) }
 }
 
-fn done_cell(summary: &PipelineSummary, most: u64) -> Markup {
+/// Number of logs of the main figure.
+fn logs_of(summary: &PipelineSummary, place: ComparisonSpace) -> u64 {
+    summary.figures.get(&MAIN.key(place)).map_or(0, |estimate| estimate.logs)
+}
+
+fn done_cell(summary: &PipelineSummary, most: u64, [logs, most_logs]: [u64; 2]) -> Markup {
     let planned = summary.done + summary.failed + summary.skipped;
     let class = if summary.done < most || summary.failed > 0 { "number fewer" } else { "number" };
-    html! { td class=(class) data-value=(summary.done) { (summary.done) " / " (planned) } }
+    html! {
+        td class=(class) data-value=(summary.done) {
+            (summary.done) " / " (planned)
+            @if logs < most_logs && logs != summary.done { " " span class="fewer" { (counted(logs, "log")) } }
+        }
+    }
 }
 
 fn people_cell(summary: &PipelineSummary) -> Markup {
@@ -264,7 +276,7 @@ fn informs(ends: &[f64; 2], [least, most]: [f64; 2]) -> bool {
 
 /// Renders the ends of an interval below the value of a cell.
 fn labelled_ends(ends: [f64; 2], decimals: usize) -> Markup {
-    html! { span class="ends" { "95\u{a0}%: " (span_of(ends, decimals)) } }
+    html! { span class="ends" { span class="level" { "95\u{a0}%: " } (span_of(ends, decimals)) } }
 }
 
 pub(super) fn ends_of([low, high]: [f64; 2], decimals: usize) -> Markup {

@@ -30,6 +30,9 @@ const TITLE: &str = "Tagalong benchmark";
 /// Most pipelines that are told apart in one chart or image; of more the best ones are shown.
 const MOST_DRAWN: usize = 8;
 
+/// Anchors of the sections that are a sentence and a folded list; two stand beside each other.
+const SHORT: [&str; 5] = ["failed", "repairs", "funnel", "tasks", "inputs"];
+
 /// Most entries of a list that are not folded together.
 const MOST_UNFOLDED: usize = 6;
 
@@ -91,6 +94,8 @@ struct Section {
     anchor: &'static str,
     heading: &'static str,
     body: Markup,
+    /// True for a sentence and a list that is folded, which needs half of the width.
+    is_short: bool,
 }
 
 impl Page<'_> {
@@ -107,7 +112,7 @@ impl Page<'_> {
             }
             main id="main" tabindex="-1" {
                 @for section in &sections {
-                    section id=(section.anchor) aria-labelledby=(format!("h-{}", section.anchor)) {
+                    section id=(section.anchor) class=[section.is_short.then_some("small")] aria-labelledby=(format!("h-{}", section.anchor)) {
                         h2 id=(format!("h-{}", section.anchor)) { (section.heading) }
                         (section.body)
                     }
@@ -131,20 +136,24 @@ impl Page<'_> {
             ("speed", "Accuracy and time", first),
             ("results", "Results", Some(results)),
             ("failed", "Failed and skipped", self.failed()),
-            ("missed", "Missed people, and why", self.missed()),
-            ("repairs", "Where work pays", self.repairs()),
-            ("pairs", "Pipelines side by side", self.pairs()),
             ("speed", "Accuracy and time", later),
+            ("missed", "Missed people, and why", self.missed()),
+            ("pairs", "Pipelines side by side", self.pairs()),
+            ("repairs", "Where work pays", self.repairs()),
+            ("funnel", "Why candidates were dropped", self.funnels()),
             ("miss-rate", "Miss rate", self.miss_rates()),
             ("floor", "Seen from above", self.plans()),
-            ("funnel", "Why candidates were dropped", self.funnels()),
             ("events", "What happened when", self.events()),
             ("tasks", "All tasks", self.all_tasks()),
-            ("reading", "How to read this", Some(self.explain())),
             ("inputs", "Versions and hashes", self.inputs()),
+            ("reading", "How to read this", Some(self.explain())),
         ];
         let shown = sections.into_iter().filter_map(|(anchor, heading, body)| {
-            body.map(|body| Section { anchor, heading, body })
+            let is_short = match anchor {
+                "speed" => self.timings.is_none(),
+                _ => SHORT.contains(&anchor),
+            };
+            body.map(|body| Section { anchor, heading, body, is_short })
         });
         shown.collect()
     }

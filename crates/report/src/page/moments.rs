@@ -68,11 +68,13 @@ impl Page<'_> {
             return html! { @for moment in &self.moments { (self.moment(moment)) } };
         }
         html! {
-            // They are sorted by log.
-            @for of_log in self.moments.chunk_by(|a, b| a.log == b.log) {
-                details class="group" {
-                    summary { (of_log[0].log) span class="aside" { (counted(of_log.len(), "moment")) } }
-                    @for moment in of_log { (self.moment(moment)) }
+            div class="folds" {
+                // They are sorted by log.
+                @for of_log in self.moments.chunk_by(|a, b| a.log == b.log) {
+                    details class="group" {
+                        summary { (of_log[0].log) span class="aside" { (counted(of_log.len(), "moment")) } }
+                        @for moment in of_log { (self.moment(moment)) }
+                    }
                 }
             }
         }

@@ -26,6 +26,23 @@
   };
   all(".scroll > table").forEach(nameCells);
 
+  // Of a long table that is not folded the first rows are shown, on a phone fewer, with their first cells.
+  const MOST_ROWS = 8;
+  for (const table of all(".scroll > table").filter((it) => !it.closest("details"))) {
+    const count = table.tBodies[0].rows.length;
+    if (count <= MOST_ROWS) continue;
+    const more = document.createElement("button");
+    more.type = "button";
+    more.className = "more";
+    const shorten = (isShort) => {
+      table.classList.toggle("short", isShort);
+      more.textContent = isShort ? `Show the whole table of ${count} rows` : "Show the first rows";
+    };
+    more.addEventListener("click", () => shorten(!table.classList.contains("short")));
+    shorten(true);
+    table.parentElement.after(more);
+  }
+
   // Tables sort by a click on a heading: once, the other way, and back again.
   const valueOf = (row, column) => {
     const cell = row.cells[column];

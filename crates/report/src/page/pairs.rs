@@ -86,7 +86,14 @@ impl Page<'_> {
             }
             @if self.view.pipelines.len() > 2 { (self.matrix()) }
             @let pairs = self.described_pairs();
-            @for (a, b) in &pairs { (self.pair(a, b, MOST_LISTED / pairs.len())) }
+            @let (open, folded) = pairs.split_at(pairs.len().min(MOST_UNFOLDED));
+            (self.pairs_of(open, pairs.len()))
+            @if !folded.is_empty() {
+                details class="print" {
+                    summary { (counted(folded.len(), "more pair")) }
+                    (self.pairs_of(folded, pairs.len()))
+                }
+            }
             @if self.tried().count() > ALL_PAIRS_OF {
                 p { "Described is the best pipeline against the next ones; all pairs are in report.json." }
             }
@@ -231,23 +238,30 @@ impl Page<'_> {
         )
     }
 
+    /// Renders some of `count` pairs beside each other.
+    fn pairs_of(&self, pairs: &[(&str, &str)], count: usize) -> Markup {
+        html! { div class="folds wide" { @for (a, b) in pairs { (self.pair(a, b, MOST_LISTED / count)) } } }
+    }
+
     fn pair(&self, a: &str, b: &str, most: usize) -> Markup {
         let rows: Vec<&PairSummary> =
             self.summary.pairs.iter().filter(|p| p.a == a && p.b == b).collect();
         let clear = rows.iter().filter(|p| p.is_clear()).count();
         let differences = compare_in(&self.view, a, b);
         html! {
-            @if let Some(why) = self.why_of_pair(a, b) { p class="pair-why" { (why) "." } }
-            details class="pair print" {
-                summary {
-                    (key(self.series(a), a)) " against " (key(self.series(b), b))
-                    span class="aside" {
-                        @if rows.is_empty() { "no log in common" }
-                        @else { (clear) " of " (counted(rows.len(), "figure")) " clear, " (counted(differences.len(), "event")) " differ" }
+            div class="pair" {
+                @if let Some(why) = self.why_of_pair(a, b) { p class="pair-why" { (why) "." } }
+                details class="print" {
+                    summary {
+                        (key(self.series(a), a)) " against " (key(self.series(b), b))
+                        span class="aside" {
+                            @if rows.is_empty() { "no log in common" }
+                            @else { (clear) " of " (counted(rows.len(), "figure")) " clear, " (counted(differences.len(), "event")) " differ" }
+                        }
                     }
+                    @if !rows.is_empty() { (gain_table(a, b, &rows)) }
+                    (self.differences(a, b, &differences, most))
                 }
-                @if !rows.is_empty() { (gain_table(a, b, &rows)) }
-                (self.differences(a, b, &differences, most))
             }
         }
     }

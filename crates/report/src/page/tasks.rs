@@ -59,9 +59,12 @@ impl Page<'_> {
             })
             .collect();
         (!constant.is_empty()).then(|| html! {
-            p {
-                "LAMR and AP mean nothing where the reports have fewer than " (FEW_SCORES) " different scores, since no threshold tells sure reports from unsure ones; LAMR is left out: "
-                @for (i, t) in constant.iter().enumerate() { @if i > 0 { ", " } (t.pipeline) " on " (t.log) } "."
+            details class="print" open[constant.len() <= MOST_UNFOLDED] {
+                summary { "LAMR and AP mean nothing in " (counted(constant.len(), "task")) }
+                p {
+                    "Where the reports have fewer than " (FEW_SCORES) " different scores, no threshold tells sure reports from unsure ones; LAMR is left out: "
+                    @for (i, t) in constant.iter().enumerate() { @if i > 0 { ", " } (t.pipeline) " on " (t.log) } "."
+                }
             }
         })
     }

@@ -164,6 +164,7 @@ fn image_marks() -> Markup {
         (mark("box-seen", "seen"))
         (mark("box-guess", "predicted"))
         (mark("box-tentative", "not confirmed yet"))
+        span { "~ guessed distance" }
         span data-layer="target" { (mark("sign", "target")) }
         span data-layer="truth" { (mark("box-truth", "annotated")) }
         span data-layer="truth" { (mark("box-miss", "missed")) }
