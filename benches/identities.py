@@ -1,11 +1,11 @@
-"""Lists ID switches and inherited IDs of runs, with their kinds, as a Markdown table.
+"""Lists the kinds of ID switches, inherited IDs and missed people of runs, as Markdown tables.
 
 Usage: python3 benches/identities.py LOGS_FOLDER RUNS_FOLDER LOG...
        python3 benches/identities.py TRUTH.people.csv RUN_FOLDER
 
-The first form reads LOGS_FOLDER/LOG.people.csv and RUNS_FOLDER/LOG. A switch: a person has another ID
-than when matched last. An inherited ID: a person has the ID that another person had last. Boxes match
-at an IoU of 0.4 and more, the best pairs of a frame first.
+The first form reads LOGS_FOLDER/LOG.people.csv and RUNS_FOLDER/LOG. The numbers of switches and of
+inherited IDs are `IDSW` and `inherited_ids` of `tagalong eval`; here boxes match at an IoU of 0.4 and
+more, the best pairs of a frame first.
 
 Kinds, the first that fits:
   recognised wrongly   inherited, and not reported in each frame since
@@ -184,15 +184,11 @@ def main():
         logs, folder = Path(arguments[0]), Path(arguments[1])
         runs = [(log, logs / f"{log}.people.csv", folder / log) for log in arguments[2:]]
     print("| log | frame | event | kind |", "| --- | --- | --- | --- |", sep="\n")
-    counts = [0, 0]
     for log, truth, run in runs:
-        found = events(truth, run)
-        for kind, listed in enumerate(found):
-            counts[kind] += len(listed)
-        for frame, event, kind in sorted(found[0] + found[1]):
+        switches, inherited = events(truth, run)
+        for frame, event, kind in sorted(switches + inherited):
             print(f"| {log} | {frame} | {event} | {kind} |")
-    print(f"\n{counts[0]} switches, {counts[1]} inherited IDs\n")
-    print("| log | people-frames | missed | cut by the border | hidden | others |")
+    print("\n| log | people-frames | missed | cut by the border | hidden | others |")
     print("|---" * 6 + "|")
     for log, truth, run in runs:
         people, missed = misses(truth, run)

@@ -13,7 +13,7 @@ type Seen = (u32, u32, Option<u32>);
 /// Python.
 fn events(people: &[Row], tracks: &[Seen], step_ms: u64) -> Option<Vec<String>> {
     let text = printed(people, tracks, step_ms)?;
-    let (events, _) = text.split_once(" switches, ").unwrap();
+    let (events, _) = text.split_once("\n\n").unwrap();
     Some(cells(events))
 }
 
@@ -113,6 +113,6 @@ fn missed_people_are_counted_by_what_hides_them() {
         (5, 1, 100, 1.0, "0"),
     ];
     let Some(text) = printed(&people, &[(1, 5, Some(100))], 100) else { return };
-    let (_, missed) = text.split_once(" switches, ").unwrap();
+    let (_, missed) = text.split_once("\n\n").unwrap();
     assert_eq!(cells(missed), ["5; 4; 1; 1; 2 |"]);
 }

@@ -188,8 +188,18 @@ fn table(tasks: &[&TaskResult]) -> String {
     let first = tasks.iter().map(|task| task.pipeline.len()).fold(8, usize::max);
     let second = tasks.iter().map(|task| task.log.len()).fold(8, usize::max);
     let mut out = format!(
-        "{:<first$}  {:<second$}  {:>6}  {:>6}  {:>6}  {:>6}  {:>5}  {:>14}  {:>10}\n",
-        "pipeline", "log", "seed", "HOTA", "MOTA", "IDF1", "IDSW", "wrong person s", "error m"
+        "{:<first$}  {:<second$}  {:>6}  {:>6}  {:>6}  {:>6}  {:>6}  {:>5}  {:>9}  {:>14}  {:>10}\n",
+        "pipeline",
+        "log",
+        "seed",
+        "HOTA",
+        "AssA",
+        "MOTA",
+        "IDF1",
+        "IDSW",
+        "inherited",
+        "wrong person s",
+        "error m"
     );
     for task in tasks {
         let _ = write!(out, "{:<first$}  {:<second$}  {:>6}  ", task.pipeline, task.log, task.seed);
@@ -212,12 +222,13 @@ fn first_line(text: &str) -> &str {
 
 fn figures(task: &TaskResult) -> String {
     let Some(scores) = task.image.or(task.metres) else { return "nothing to score".into() };
-    let [hota, mota, idf1, error_m] =
-        [scores.hota, scores.mota, scores.idf1, scores.position_error_mean_m]
-            .map(|value| value.map_or("-".to_owned(), |value| format!("{value:.3}")));
+    let figures =
+        [scores.hota, scores.ass_a, scores.mota, scores.idf1, scores.position_error_mean_m];
+    let [hota, ass_a, mota, idf1, error_m] =
+        figures.map(|value| value.map_or("-".to_owned(), |value| format!("{value:.3}")));
     format!(
-        "{hota:>6}  {mota:>6}  {idf1:>6}  {:>5}  {:>14.2}  {error_m:>10}",
-        scores.idsw, scores.wrong_person_s
+        "{hota:>6}  {ass_a:>6}  {mota:>6}  {idf1:>6}  {:>5}  {:>9}  {:>14.2}  {error_m:>10}",
+        scores.idsw, scores.inherited_ids, scores.wrong_person_s
     )
 }
 
@@ -234,8 +245,14 @@ mod tests {
 
     #[test]
     fn figures_in_the_image_and_on_the_floor_are_told_apart() {
-        let scores =
-            Scores { hota: Some(0.5), idsw: 1, wrong_person_s: 5.125, ..Scores::default() };
+        let scores = Scores {
+            hota: Some(0.5),
+            ass_a: Some(0.25),
+            idsw: 1,
+            inherited_ids: 3,
+            wrong_person_s: 5.125,
+            ..Scores::default()
+        };
         let image = TaskResult { image: Some(scores), metres: Some(scores), ..task("a", "hall") };
         let floor = TaskResult { metres: Some(scores), ..task("a", "laser") };
         let text = tables(&[floor, image.clone()]);
@@ -245,7 +262,10 @@ mod tests {
         assert!(floor_title.starts_with("on the floor") && laser.contains("laser"), "{text}");
         assert!(head.contains("wrong person s"), "{head}");
         let cells: Vec<&str> = hall.split_whitespace().collect();
-        assert_eq!(cells, ["a", "hall", "0", "0.500", "-", "-", "1", "5.12", "-"]);
+        let shown = ["a", "hall", "0", "0.500", "0.250", "-", "-", "1", "3", "5.12", "-"];
+        assert_eq!(cells, shown);
+        let titles: Vec<&str> = head.split_whitespace().collect();
+        assert_eq!(titles[3..9], ["HOTA", "AssA", "MOTA", "IDF1", "IDSW", "inherited"]);
         assert!(!tables(&[image]).contains("on the floor, as"));
     }
 

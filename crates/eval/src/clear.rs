@@ -36,6 +36,11 @@ pub struct Clear {
     pub fp: u64,
     /// Changes of the track that goes with a truth.
     pub id_switches: u64,
+    /// Matches of a truth with a track whose last match was another truth: the truth has inherited an
+    /// ID. Two truths that swap their tracks are two switches and two of these; a new person with the
+    /// ID of one who left is one of these and no switch. TrackEval has no such figure.
+    #[serde(default)]
+    pub inherited_ids: u64,
     /// Interruptions: the number of times that a truth was found again after a pause. As in
     /// TrackEval a person that left the view and came back counts, too.
     pub fragmentations: u64,
@@ -67,6 +72,7 @@ impl Clear {
             fn_: a.fn_ + b.fn_,
             fp: a.fp + b.fp,
             id_switches: a.id_switches + b.id_switches,
+            inherited_ids: a.inherited_ids + b.inherited_ids,
             fragmentations: a.fragmentations + b.fragmentations,
             mostly_tracked: a.mostly_tracked + b.mostly_tracked,
             partly_tracked: a.partly_tracked + b.partly_tracked,
@@ -116,6 +122,8 @@ struct Run {
     chosen: Vec<u32>,
     /// Last track that each truth ever had.
     last: Vec<Option<u32>>,
+    /// Last truth that each track ever had.
+    last_of_track: Vec<Option<u32>>,
     /// Track that each truth had in the previous frame with anybody in it.
     previous: Vec<Option<u32>>,
     /// The truths with a track in `previous`.
@@ -133,6 +141,7 @@ impl Run {
             scored: Vec::new(),
             chosen: Vec::new(),
             last: vec![None; truths],
+            last_of_track: vec![None; prepared.track_ids.len()],
             previous: vec![None; truths],
             held: Vec::new(),
             matched: vec![0; truths],
@@ -152,7 +161,7 @@ impl Run {
         self.score_pairs(frame);
         self.matcher.best(truths, tracks, &self.scored, &mut self.chosen);
         let matches: Vec<Match> = self.chosen.iter().map(|&e| self.plain(e)).collect();
-        self.count_switches(frame, &matches);
+        self.count_wrong_ids(frame, &matches);
         self.remember(frame, &matches);
         self.clear.tp += matches.len() as u64;
         self.clear.fn_ += (truths - matches.len()) as u64;
@@ -181,11 +190,14 @@ impl Run {
         Match { row, col, similarity }
     }
 
-    fn count_switches(&mut self, frame: &PreparedFrame, matches: &[Match]) {
+    fn count_wrong_ids(&mut self, frame: &PreparedFrame, matches: &[Match]) {
         for m in matches {
-            let truth = frame.truths[m.row as usize] as usize;
+            let truth = frame.truths[m.row as usize];
             let track = frame.tracks[m.col as usize];
-            self.clear.id_switches += u64::from(self.last[truth].is_some_and(|t| t != track));
+            let before = self.last[truth as usize];
+            self.clear.id_switches += u64::from(before.is_some_and(|t| t != track));
+            let before = self.last_of_track[track as usize];
+            self.clear.inherited_ids += u64::from(before.is_some_and(|t| t != truth));
         }
     }
 
@@ -202,9 +214,10 @@ impl Run {
         }
         for m in matches {
             let truth = frame.truths[m.row as usize];
-            let track = Some(frame.tracks[m.col as usize]);
-            self.last[truth as usize] = track;
-            self.previous[truth as usize] = track;
+            let track = frame.tracks[m.col as usize];
+            self.last[truth as usize] = Some(track);
+            self.last_of_track[track as usize] = Some(truth);
+            self.previous[truth as usize] = Some(track);
             self.held.push(truth);
         }
     }

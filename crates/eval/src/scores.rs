@@ -114,6 +114,7 @@ impl Tally {
             fp: self.clear.fp,
             fn_: self.clear.fn_,
             idsw: self.clear.id_switches,
+            inherited_ids: self.clear.inherited_ids,
             frag: self.clear.fragmentations,
             mt: self.clear.mostly_tracked,
             pt: self.clear.partly_tracked,
@@ -227,6 +228,9 @@ pub struct Scores {
     /// Identity switches.
     #[serde(rename = "IDSW")]
     pub idsw: u64,
+    /// Matches of a person with the ID that another person had last.
+    #[serde(default)]
+    pub inherited_ids: u64,
     /// Reports without a truth.
     #[serde(rename = "FP")]
     pub fp: u64,

@@ -188,6 +188,47 @@ fn a_switch_a_gap_and_a_wrong_person() {
     assert_eq!(times.duration_s, 7.0);
 }
 
+/// Returns the ID switches and the inherited IDs of a scene, in the image as on the floor.
+fn wrong_ids(frames: &[(Places<'_>, Places<'_>)]) -> (u64, u64) {
+    let scene = sequence(frames);
+    let [image, floor] = [Similarity::Iou, Similarity::Metres].map(|similarity| {
+        let scores = Scores::measure(&scene, similarity).unwrap();
+        (scores.idsw, scores.inherited_ids)
+    });
+    assert_eq!(image, floor, "the same in the image and on the floor");
+    image
+}
+
+#[test]
+fn a_newcomer_inherits_the_id_that_another_person_had_last() {
+    // Person 1 leaves, nobody is there for a frame, and person 2 comes in elsewhere with the ID.
+    let left: (Places<'_>, Places<'_>) = (&[(1, 0.0)], &[(7, 0.0)]);
+    let empty: (Places<'_>, Places<'_>) = (&[], &[]);
+    let came: (Places<'_>, Places<'_>) = (&[(2, 5.0)], &[(7, 5.0)]);
+    assert_eq!(wrong_ids(&[left, empty, came]), (0, 1));
+    // It counts once: from then on the ID is that of person 2, also after a pause.
+    assert_eq!(wrong_ids(&[left, empty, came, came, empty, came]), (0, 1));
+    // Person 1 has it again: inherited from person 2, and no switch, as 7 is the last ID of both.
+    assert_eq!(wrong_ids(&[left, came, left]), (0, 2));
+    // A person who comes back with the own ID, or a newcomer with a new one, has inherited nothing.
+    assert_eq!(wrong_ids(&[left, empty, left]), (0, 0));
+    assert_eq!(wrong_ids(&[left, empty, (&[(2, 5.0)], &[(8, 5.0)])]), (0, 0));
+    // An ID that was on nobody belongs to nobody.
+    assert_eq!(wrong_ids(&[(&[(1, 0.0)], &[(7, 5.0)]), came]), (0, 0));
+}
+
+#[test]
+fn two_people_who_swap_their_ids_inherit_both() {
+    let people: Places<'_> = &[(1, 0.0), (2, 5.0)];
+    let before: (Places<'_>, Places<'_>) = (people, &[(7, 0.0), (8, 5.0)]);
+    let after: (Places<'_>, Places<'_>) = (people, &[(8, 0.0), (7, 5.0)]);
+    assert_eq!(wrong_ids(&[before, after, after]), (2, 2));
+    // Person 2 alone takes over the ID of person 1, who is not found any more.
+    assert_eq!(wrong_ids(&[before, (people, &[(7, 5.0)])]), (1, 1));
+    // A new ID is a switch and was nobody's.
+    assert_eq!(wrong_ids(&[before, (people, &[(9, 0.0), (8, 5.0)])]), (1, 0));
+}
+
 #[test]
 fn a_track_is_kept_before_similarity_is_looked_at() {
     // The second track lies better in the second frame, the first well enough.
@@ -330,6 +371,7 @@ fn the_flat_object_carries_the_names_of_the_field() {
         "IDP",
         "IDR",
         "IDSW",
+        "inherited_ids",
         "FP",
         "FN",
         "TP",
@@ -355,6 +397,7 @@ fn what_is_counted_adds_up_field_by_field() {
             fn_: 2 * n,
             fp: 3 * n,
             id_switches: 5 * n,
+            inherited_ids: 23 * n,
             fragmentations: 7 * n,
             mostly_tracked: 11 * n,
             partly_tracked: 13 * n,

@@ -43,7 +43,7 @@ pub use source::{BuildError, ConfigSource};
 pub use suits::Suits;
 pub use tune::{Tunable, with_values};
 
-const OWN: [&str; 14] = [
+const OWN: [&str; 15] = [
     "seed",
     "without",
     "robot",
@@ -55,6 +55,7 @@ const OWN: [&str; 14] = [
     "births",
     "appearance",
     "reidentification",
+    "silhouette",
     "target",
     "command_limiter",
     "collision_monitor",

@@ -119,6 +119,6 @@ pub use tagalong_stereo::StereoSettings;
 pub use tagalong_tracking::StepError;
 pub use tagalong_tracking::{
     BirthSettings, Candidate, ClockSettings, DetectorSettings, Fate, IdentityCorrection,
-    IdentityDoubt, MergeSettings, OcclusionSettings, Outcome, Role, Weighing,
+    IdentityDoubt, MergeSettings, OcclusionSettings, Outcome, Role, SilhouetteSettings, Weighing,
 };
 pub use tagalong_vision::odometry::{MotionSource, OdometrySettings};

@@ -11,7 +11,7 @@ use crate::AppearanceSettings;
 
 use tagalong_tracking::{
     BirthSettings, ClockSettings, MergeSettings, OcclusionSettings, ReidentificationSettings,
-    TrackerSettings,
+    SilhouetteSettings, TrackerSettings,
 };
 
 /// Keys of the pipeline itself. Beside them a config has the plugin sections `[[detectors]]`,
@@ -48,6 +48,8 @@ pub struct PipelineSettings {
     pub appearance: AppearanceSettings,
     /// Recognition of people by their appearance.
     pub reidentification: ReidentificationSettings,
+    /// Reported boxes at the trunk that the depth image shows.
+    pub silhouette: SilhouetteSettings,
     /// Choice and confirmation of the person to follow.
     pub target: TargetSettings,
     /// Limits on the robot's motion, for any wish of the controller.
@@ -65,8 +67,9 @@ impl PipelineSettings {
 
     /// Returns the settings of the tracker.
     pub(crate) fn tracker(&self) -> TrackerSettings {
-        let Self { clock, merge, occlusion, births, reidentification, .. } = self.clone();
-        TrackerSettings { clock, merge, occlusion, births, reidentification }
+        let Self { clock, merge, occlusion, births, reidentification, silhouette, .. } =
+            self.clone();
+        TrackerSettings { clock, merge, occlusion, births, reidentification, silhouette }
     }
 }
 

@@ -165,6 +165,15 @@ const FIGURES: &[Figure] = &[
         ..RATE
     },
     Figure {
+        name: "inherited_ids",
+        range: POSITIVE,
+        decimals: 1,
+        higher_is_better: false,
+        meaning: "How often a person gets the ID that another one had last, per log.",
+        of: |s| Some(s.inherited_ids as f64),
+        ..RATE
+    },
+    Figure {
         name: "fp_per_frame",
         range: POSITIVE,
         decimals: 2,

@@ -17,6 +17,7 @@
 //! | tracks started, confirmed, ended | `table` | the track manager |
 //! | tracks of one person merged | `duplicates` | [`MergeSettings`] |
 //! | people recognised across tracks | `reidentification` | [`ReidentificationSettings`] |
+//! | reported boxes moved to the trunk | `silhouette` | [`SilhouetteSettings`] |
 //!
 //! The tracker itself decides nothing about people: it calls the plugins in this order, checks
 //! their results, and counts the candidates that they drop.
@@ -113,6 +114,7 @@ mod reidentification;
 mod report;
 mod search;
 mod settings;
+mod silhouette;
 mod stage;
 mod table;
 mod tracker;
@@ -128,7 +130,7 @@ pub use report::{
 pub use search::DetectorSlot;
 pub use settings::{
     BirthSettings, ClockSettings, DetectorSettings, MergeSettings, OcclusionSettings, Role,
-    TrackerSettings,
+    SilhouetteSettings, TrackerSettings,
 };
 pub use tracker::{Parts, STAGES, Tracked, Tracker};
 pub use weighing::Weighing;

@@ -62,6 +62,8 @@ pub struct TrackerSettings {
     pub births: BirthSettings,
     /// Recognition of people by their appearance.
     pub reidentification: ReidentificationSettings,
+    /// Boxes at the trunk that the depth image shows.
+    pub silhouette: SilhouetteSettings,
 }
 
 settings! {
@@ -106,6 +108,21 @@ settings! {
         /// (`[reidentification] association_weight`).
         #[schemars(range(min = 0.0, max = 1e6))]
         pub appearance: f64 = 0.6,
+    }
+}
+
+settings! {
+    /// Boxes at the trunk that the depth image shows.
+    #[non_exhaustive]
+    pub struct SilhouetteSettings {
+        /// Reported boxes are moved sideways to the middle of the trunk, where the depth image shows it, by
+        /// this part of the way; a box that is not moved stands over a chest straight below the head. The
+        /// place in metres, which is that of the head, stays. 0: boxes are not moved.
+        #[schemars(range(min = 0.0, max = 1.0))]
+        pub weight: f64 = 0.0,
+        /// Readings belong to the trunk if they are nearer or farther by at most this than its middle, m.
+        #[schemars(range(min = 0.01, max = 1.0))]
+        pub trunk_m: f64 = 0.2,
     }
 }
 

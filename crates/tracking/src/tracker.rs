@@ -22,6 +22,7 @@ use crate::occlusion::{
 use crate::preprocess::preprocess;
 use crate::reidentification::Reidentifier;
 use crate::search::SearchStage;
+use crate::silhouette::move_boxes;
 use crate::stage::StageLog;
 use crate::table::TrackTable;
 use crate::weighing::Metered;
@@ -160,6 +161,8 @@ impl Tracker {
         report.outcome = outcome;
         let mut report = self.finish(report, detections, log);
         people.renumber(&mut report);
+        // Last, so that no stage of the next frame depends on it.
+        move_boxes(frame, &mut report.tracks, &self.settings.silhouette);
         self.reported.clone_from(&report.tracks);
         Ok(Tracked { report, completed })
     }

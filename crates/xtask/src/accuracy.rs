@@ -4,13 +4,18 @@
 use anyhow::{Context, Result};
 
 /// Figures of the table: the head of their columns in the test, and here.
-const FIGURES: [(&str, &str); 5] = [
+const FIGURES: [(&str, &str); 7] = [
     ("HOTA", "HOTA"),
+    ("AssA", "AssA"),
     ("IDF1", "IDF1"),
+    ("inherited", "inherited"),
     ("MOTA", "MOTA"),
     ("false", "FP/frame"),
     ("recall", "recall"),
 ];
+
+/// Figures that a table which was printed before they were counted lacks: their columns are left out.
+const LATER: [&str; 2] = ["AssA", "inherited"];
 
 /// Figure of a pipeline, as shipped and left out.
 struct Pair<'a> {
@@ -26,14 +31,17 @@ pub fn markdown(table: &str, names: &str) -> Result<String> {
     let mut rows = table.lines().filter(|line| line.starts_with('|')).map(cells);
     let head = rows.next().context("there is no table")?;
     let rows: Vec<Vec<&str>> = rows.collect();
-    let titles = FIGURES.map(|(_, title)| title).join(" | ");
-    let mut out = format!("| pipeline | | {titles} |\n|---|---|{}\n", "---|".repeat(FIGURES.len()));
+    let mut figures = FIGURES.to_vec();
+    figures.retain(|(figure, _)| !LATER.contains(figure) || place_of(&head, figure).is_some());
+    let titles: Vec<&str> = figures.iter().map(|(_, title)| *title).collect();
+    let titles = titles.join(" | ");
+    let mut out = format!("| pipeline | | {titles} |\n|---|---|{}\n", "---|".repeat(figures.len()));
     for name in names.split_whitespace() {
         let row = rows.iter().find(|row| row.first() == Some(&name));
         let row = row.with_context(|| format!("there is no row `{name}`"))?;
         let mut shipped = Vec::new();
         let mut left_out = Vec::new();
-        for (figure, _) in FIGURES {
+        for (figure, _) in &figures {
             let pair = pair_of(&head, row, figure)
                 .with_context(|| format!("there is no figure `{figure}`"))?;
             shipped.push(pair.shipped);
@@ -95,9 +103,14 @@ pub fn cells(line: &str) -> Vec<&str> {
 /// Returns a figure of a row: its columns begin with the one without the room, and that of the shipped
 /// settings is the next `as is`.
 fn pair_of<'a>(head: &[&str], row: &[&'a str], figure: &str) -> Option<Pair<'a>> {
-    let first = head.iter().position(|title| *title == format!("{figure} w/o"))?;
+    let first = place_of(head, figure)?;
     let as_is = first + head[first..].iter().position(|title| *title == "as is")?;
     Some(Pair { shipped: row.get(as_is)?, left_out: row.get(first)? })
+}
+
+/// Returns the place of the column of a figure without the room.
+fn place_of(head: &[&str], figure: &str) -> Option<usize> {
+    head.iter().position(|title| *title == format!("{figure} w/o"))
 }
 
 #[cfg(test)]
@@ -115,6 +128,23 @@ mod tests {
         let rows: Vec<&str> = shown.lines().collect();
         assert_eq!(rows[2], "| `a` | as shipped | 0.4 | 1.3 | 2.3 | 3.3 | 4.3 |");
         assert_eq!(rows[3], "| | left out | 0.1 | 1.1 | 2.1 | 3.1 | 4.1 |");
+    }
+
+    #[test]
+    fn identities_stand_beside_the_other_figures() {
+        let table = "|  | HOTA w/o | all | gap | as is | AssA w/o | as is | IDF1 w/o | as is | inherited w/o | as is | MOTA w/o | as is | false w/o | as is | recall w/o | as is |\n\
+            |---|---|\n\
+            | a | 0.1 | 0.2 | 0.3 | 0.4 | 5.1 | 5.2 | 1.1 | 1.3 | 7 | 2 | 2.1 | 2.3 | 3.1 | 3.3 | 4.1 | 4.3 |\n";
+        let shown = markdown(table, "a").unwrap();
+        let rows: Vec<&str> = shown.lines().collect();
+        assert_eq!(
+            rows[0],
+            "| pipeline | | HOTA | AssA | IDF1 | inherited | MOTA | FP/frame | recall |"
+        );
+        assert_eq!(rows[2], "| `a` | as shipped | 0.4 | 5.2 | 1.3 | 2 | 2.3 | 3.3 | 4.3 |");
+        assert_eq!(rows[3], "| | left out | 0.1 | 5.1 | 1.1 | 7 | 2.1 | 3.1 | 4.1 |");
+        let error = markdown(&table.replace("MOTA", "MOT"), "a").unwrap_err().to_string();
+        assert!(error.contains("no figure `MOTA`"), "{error}");
     }
 
     #[test]

@@ -7,19 +7,33 @@ use tagalong_report::{Cell, Row, Table};
 
 use super::report::Fitted;
 
-/// Reads one figure.
-type Read = fn(&Figures) -> f64;
+/// Figure that is compared.
+struct Compared {
+    /// Title of its column.
+    title: &'static str,
+    /// True if single frames have no say in it.
+    is_over_time: bool,
+    /// Digits of its value and of a difference of it.
+    digits: [usize; 2],
+    read: fn(&Figures) -> f64,
+}
 
-/// Figures that are compared, with the titles of their columns.
-const COMPARED: [(&str, Read); 5] = [
-    ("HOTA", |figures| figures.hota),
-    ("IDF1", |figures| figures.idf1),
-    ("MOTA", |figures| figures.mota),
-    ("false", |figures| figures.false_a_frame),
-    ("recall", |figures| figures.recall),
+const RATE: Compared = Compared { title: "", is_over_time: true, digits: [3, 3], read: |_| 0.0 };
+
+const COMPARED: [Compared; 7] = [
+    Compared { title: "HOTA", read: |figures| figures.hota, ..RATE },
+    Compared { title: "AssA", read: |figures| figures.ass_a, ..RATE },
+    Compared { title: "IDF1", read: |figures| figures.idf1, ..RATE },
+    Compared {
+        title: "inherited",
+        digits: [0, 1],
+        read: |figures| figures.inherited as f64,
+        ..RATE
+    },
+    Compared { title: "MOTA", read: |figures| figures.mota, ..RATE },
+    Compared { title: "false", is_over_time: false, read: |figures| figures.false_a_frame, ..RATE },
+    Compared { title: "recall", is_over_time: false, read: |figures| figures.recall, ..RATE },
 ];
-/// Number of the first of them that single frames have no say in.
-const OVER_TIME: usize = 3;
 
 /// Differences of a pipeline to the baseline over the rooms that both can read.
 #[derive(Serialize)]
@@ -44,13 +58,13 @@ impl Pair {
             let other = baseline.rooms.iter().find(|other| other.room == room.room);
             both.extend(other.map(|other| (room.single_frames, [other.without, room.without])));
         }
-        let gains = COMPARED.iter().enumerate().map(|(number, (_, figure))| {
+        let gains = COMPARED.iter().map(|compared| {
             let mut a = Vec::new();
             let mut b = Vec::new();
             for (single_frames, [other, own]) in &both {
-                if !(*single_frames && number < OVER_TIME) {
-                    a.push(figure(other));
-                    b.push(figure(own));
+                if !(*single_frames && compared.is_over_time) {
+                    a.push((compared.read)(other));
+                    b.push((compared.read)(own));
                 }
             }
             paired_gain(&a, &b)
@@ -69,10 +83,12 @@ pub fn differences(pairs: &[Pair]) -> Option<Table> {
     let baseline = &pairs.first()?.baseline;
     let rows = pairs.iter().map(|pair| {
         let rooms = Cell::number(pair.rooms as f64, 0);
-        let gains = pair.gains.iter().map(|gain| Cell::estimate(gain.map(|of| of.difference), 3));
+        let gains = pair.gains.iter().zip(&COMPARED).map(|(gain, compared)| {
+            Cell::estimate(gain.map(|of| of.difference), compared.digits[1])
+        });
         Row::ours(&pair.pipeline, std::iter::once(rooms).chain(gains).collect())
     });
-    let titles = COMPARED.iter().map(|(title, _)| *title);
+    let titles = COMPARED.iter().map(|compared| compared.title);
     Some(Table {
         title: format!("Difference to {baseline}, each without the room that is scored"),
         columns: std::iter::once("rooms").chain(titles).map(String::from).collect(),
@@ -80,7 +96,7 @@ pub fn differences(pairs: &[Pair]) -> Option<Table> {
         notes: vec![
             "Means of the differences w/o, paired by room, all of the same weight, with Student's \
              intervals of 95 % over rooms; fewer than six rooms are never called clear. Rooms of \
-             single frames have no say in HOTA, IDF1 and MOTA."
+             single frames have no say in HOTA, AssA, IDF1, MOTA and inherited IDs."
                 .to_owned(),
         ],
     })
@@ -94,18 +110,23 @@ pub fn by_log(pipelines: &[Fitted]) -> Table {
     });
     let mut rows: Vec<(&str, Row)> = rows.collect();
     rows.sort_by_key(|(log, _)| *log);
-    let two = COMPARED.iter().flat_map(|(title, _)| [format!("{title} w/o"), "as is".into()]);
+    let two = COMPARED.iter().flat_map(|of| [format!("{} w/o", of.title), "as is".into()]);
     Table {
         title: "Log by log".into(),
         columns: two.chain(["off m w/o".into()]).collect(),
         rows: rows.into_iter().map(|(_, row)| row).collect(),
-        notes: vec!["w/o: without the room of the log, its other logs included.".to_owned()],
+        notes: vec![
+            "w/o: without the room of the log, its other logs included; inherited: IDs that another \
+             person had last."
+                .to_owned(),
+        ],
     }
 }
 
 fn row(name: &str, log: &super::report::InLog) -> Row {
-    let each = COMPARED.iter().flat_map(|(_, figure)| [&log.without, &log.shipped].map(figure));
-    let cells = each.map(|figure| Cell::number(figure, 3));
+    let cells = COMPARED.iter().flat_map(|of| {
+        [&log.without, &log.shipped].map(|log| Cell::number((of.read)(log), of.digits[0]))
+    });
     let off = log.without.position_error_m.map_or_else(Cell::default, |off| Cell::number(off, 3));
     Row::ours(name, cells.chain([off]).collect())
 }
@@ -118,13 +139,16 @@ mod tests {
     /// Better by 0.2 in two rooms, and worse by 0.4 in single frames.
     #[test]
     fn single_frames_have_no_say_in_what_is_tracked() {
-        let own = vec![room("A", false, 9, 0.8), room("B", false, 9, 0.6), room("D", true, 9, 0.1)];
+        let mut own =
+            vec![room("A", false, 9, 0.8), room("B", false, 9, 0.6), room("D", true, 9, 0.1)];
+        own[0].without.inherited = 1;
+        own[2].without.inherited = 9;
         let base =
             vec![room("A", false, 9, 0.6), room("B", false, 9, 0.4), room("D", true, 9, 0.5)];
         let pair = &pairs(&[fitted("own", own), fitted("base", base)])[0];
         let gains: Vec<f64> =
             pair.gains.iter().map(|gain| gain.unwrap().difference.estimate).collect();
-        for (gain, expected) in gains.iter().zip([0.2, 0.2, 0.2, 0.0, 0.0]) {
+        for (gain, expected) in gains.iter().zip([0.2, 0.2, 0.2, 0.5, 0.2, 0.0, 0.0]) {
             assert!((gain - expected).abs() < 1e-12, "{gains:?}");
         }
         assert_eq!(pair.rooms, 3);

@@ -69,7 +69,7 @@ struct Skipped {
 pub struct InRoom {
     pub room: String,
     /// True if nothing is tracked over its frames: it has no say in the choice, nor in the means of
-    /// HOTA, IDF1 and MOTA.
+    /// the figures of tracking.
     pub single_frames: bool,
     /// Settings that the other rooms chose.
     chosen_without: Values,
@@ -168,15 +168,16 @@ impl Report {
         let mut notes = vec![
             "The means here weigh each room by its annotated people, each counted once per frame; \
              rooms alike: the mean in which all rooms have the same weight. Rooms of single frames \
-             have no say in HOTA, IDF1 and MOTA, nor in what is chosen."
+             have no say in HOTA, AssA, IDF1, MOTA and inherited IDs, nor in what is chosen."
                 .to_owned(),
             format!("Rooms: {}.", rooms.join("; ")),
             "w/o: in each room, with the settings that the other rooms chose, and with models \
              that have not seen it where the rooms name such; all: with those \
              that all rooms chose, this one among them, and the shipped models; gap: HOTA of all less that of w/o; as is: \
-             with the settings of the config; false: false people in a frame; free, partly: recall of people within 5 m of the \
+             with the settings of the config; inherited: IDs that another person had last, counted over \
+             the logs of a room and added up in the means; false: false people in a frame; free, partly: recall of people within 5 m of the \
              camera of whom at least 90 % and 60 to 90 % shows; off: mean distance of a track from \
-             its person. A room's figure is the mean over its logs."
+             its person. Another figure of a room is the mean over its logs; rooms.json has all of them."
                 .to_owned(),
             format!(
                 "Chosen by the mean of {objective} over rooms, weighed by people, among at most {} \
@@ -331,11 +332,20 @@ impl Scorer<'_> {
     }
 }
 
-/// Returns the mean of figures over rooms; HOTA, IDF1 and MOTA of those that are not single frames.
+/// Returns the mean of figures over rooms; those of tracking are of rooms that are not single frames.
 fn over_rooms(rooms: &[InRoom], read: fn(&InRoom) -> &Figures, weights: Weights) -> Figures {
-    let tracked = rooms.iter().filter(|room| !room.single_frames);
-    let Figures { hota, idf1, mota, .. } = weighted_mean(tracked.map(read), weights);
-    Figures { hota, idf1, mota, ..weighted_mean(rooms.iter().map(read), weights) }
+    let all: Vec<(bool, &Figures)> =
+        rooms.iter().map(|room| (room.single_frames, read(room))).collect();
+    mean_over_rooms(&all, weights)
+}
+
+/// Returns the mean of the figures of rooms, each with whether it has single frames.
+fn mean_over_rooms(rooms: &[(bool, &Figures)], weights: Weights) -> Figures {
+    let tracked = rooms.iter().filter(|(single_frames, _)| !single_frames);
+    let tracked = weighted_mean(tracked.map(|(_, figures)| *figures), weights);
+    let Figures { hota, ass_a, idf1, inherited, mota, .. } = tracked;
+    let all = weighted_mean(rooms.iter().map(|(_, figures)| *figures), weights);
+    Figures { hota, ass_a, idf1, inherited, mota, ..all }
 }
 
 impl Fitted {
@@ -416,17 +426,17 @@ fn columns() -> impl Iterator<Item = String> {
         "all",
         "gap",
         "as is",
+        "AssA w/o",
+        "as is",
         "IDF1 w/o",
-        "all",
+        "as is",
+        "inherited w/o",
         "as is",
         "MOTA w/o",
-        "all",
         "as is",
         "false w/o",
-        "all",
         "as is",
         "recall w/o",
-        "all",
         "as is",
         "free w/o",
         "partly w/o",
@@ -439,18 +449,21 @@ fn columns() -> impl Iterator<Item = String> {
 fn cells(room: &InRoom) -> Vec<Cell> {
     let InRoom { without, with_all, shipped, .. } = room;
     let first = [without.hota, with_all.hota, with_all.hota - without.hota, shipped.hota];
-    let all: [&Figures; 3] = [without, with_all, shipped];
-    let others = [
-        all.map(|f| f.idf1),
-        all.map(|f| f.mota),
-        all.map(|f| f.false_a_frame),
-        all.map(|f| f.recall),
-    ];
-    let figures = first.into_iter().chain(others.into_iter().flatten());
-    let shown =
-        [without.recall_free, without.recall_partly_hidden, without.position_error_m].into_iter();
-    let figures = figures.map(Some).chain(shown);
-    figures.map(|figure| figure.map_or_else(Cell::default, |f| Cell::number(f, 3))).collect()
+    let mut cells: Vec<Cell> = first.map(|figure| Cell::number(figure, 3)).into();
+    let both = [without, shipped];
+    for (digits, figures) in [
+        (3, both.map(|f| f.ass_a)),
+        (3, both.map(|f| f.idf1)),
+        (0, both.map(|f| f.inherited as f64)),
+        (3, both.map(|f| f.mota)),
+        (3, both.map(|f| f.false_a_frame)),
+        (3, both.map(|f| f.recall)),
+    ] {
+        cells.extend(figures.map(|figure| Cell::number(figure, digits)));
+    }
+    let last = [without.recall_free, without.recall_partly_hidden, without.position_error_m];
+    cells.extend(last.map(|f| f.map_or_else(Cell::default, |f| Cell::number(f, 3))));
+    cells
 }
 
 #[cfg(test)]
@@ -461,6 +474,7 @@ pub(super) mod testing {
     pub fn room(name: &str, single_frames: bool, people: u64, figure: f64) -> InRoom {
         let figures = Figures {
             hota: figure,
+            ass_a: figure,
             idf1: figure,
             mota: figure,
             false_a_frame: figure,

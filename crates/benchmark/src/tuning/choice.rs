@@ -8,9 +8,15 @@ pub struct Figures {
     /// HOTA.
     #[serde(rename = "HOTA")]
     pub hota: f64,
+    /// AssA.
+    #[serde(rename = "AssA")]
+    pub ass_a: f64,
     /// IDF1.
     #[serde(rename = "IDF1")]
     pub idf1: f64,
+    /// Number of IDs that another person had last; of a mean, the sum.
+    #[serde(rename = "inherited_ids")]
+    pub inherited: u64,
     /// MOTA.
     #[serde(rename = "MOTA")]
     pub mota: f64,
@@ -82,7 +88,9 @@ impl Figures {
     pub fn of(scores: &Scores) -> Option<Self> {
         Some(Self {
             hota: scores.hota?,
+            ass_a: scores.ass_a?,
             idf1: scores.idf1?,
+            inherited: scores.inherited_ids,
             mota: scores.mota?,
             false_a_frame: scores.fp_per_frame?,
             recall: scores.recall?,
@@ -135,6 +143,7 @@ pub fn weighted_mean<'a>(
     let all: Vec<&Figures> = figures.into_iter().collect();
     Figures {
         hota: mean_of(&all, weights, |f| Some(f.hota)).unwrap_or(0.0),
+        ass_a: mean_of(&all, weights, |f| Some(f.ass_a)).unwrap_or(0.0),
         idf1: mean_of(&all, weights, |f| Some(f.idf1)).unwrap_or(0.0),
         mota: mean_of(&all, weights, |f| Some(f.mota)).unwrap_or(0.0),
         false_a_frame: mean_of(&all, weights, |f| Some(f.false_a_frame)).unwrap_or(0.0),
@@ -143,6 +152,7 @@ pub fn weighted_mean<'a>(
         recall_partly_hidden: mean_of(&all, weights, |f| f.recall_partly_hidden),
         position_error_m: mean_of(&all, weights, |f| f.position_error_m),
         people: all.iter().map(|figures| figures.people).sum(),
+        inherited: all.iter().map(|figures| figures.inherited).sum(),
     }
 }
 
@@ -258,6 +268,15 @@ mod tests {
     }
 
     #[test]
+    fn inherited_ids_add_up_and_do_not_weigh() {
+        let few = Figures { ass_a: 0.2, inherited: 2, people: 1, ..of(0.2) };
+        let many = Figures { ass_a: 0.6, inherited: 5, people: 3, ..of(0.6) };
+        let mean = weighted_mean([&few, &many], Weights::People);
+        assert_eq!(mean.inherited, 7);
+        assert!((mean.ass_a - 0.5).abs() < 1e-12, "{mean:?}");
+    }
+
+    #[test]
     fn a_figure_that_some_lack_weighs_nothing() {
         let few = Figures { recall_free: Some(0.2), people: 1, ..of(0.2) };
         let many = Figures { recall_free: Some(0.6), people: 3, ..of(0.6) };
@@ -303,6 +322,8 @@ mod tests {
     fn a_log_without_people_has_no_figures() {
         let scores = Scores {
             hota: Some(0.1),
+            ass_a: Some(0.6),
+            inherited_ids: 3,
             idf1: Some(0.2),
             mota: Some(0.3),
             fp_per_frame: Some(0.4),
@@ -312,6 +333,7 @@ mod tests {
         };
         let figures = Figures::of(&scores).unwrap();
         assert_eq!((all(&figures), figures.people), ([0.1, 0.2, 0.3, 0.4, 0.5], 7));
+        assert_eq!((figures.ass_a, figures.inherited), (0.6, 3));
         assert_eq!(Figures::of(&Scores { hota: None, ..scores }), None);
     }
 }

@@ -215,6 +215,7 @@ fn short_title(meaning: &str) -> &str {
 /// Returns the heading of a figure: short, with its unit.
 pub(super) fn figure_name(figure: &Figure) -> String {
     let name = match figure.name {
+        "inherited_ids" => "Inherited IDs",
         "fp_per_frame" => "False / frame",
         "time_to_confirm_mean_s" => "To confirm",
         "wrong_person_s" => "Wrong person",

@@ -94,10 +94,10 @@ impl Page<'_> {
                 td { (reason(&task.outcome).map_or("done", |(outcome, _)| outcome)) }
                 (cell(task.frames as f64, &html! { (task.frames) }))
                 (cell(task.duration_s, &html! { (number(task.duration_s, 1)) }))
-                @for value in [scores.and_then(|s| s.hota), scores.and_then(|s| s.mota), scores.and_then(|s| s.idf1), scores.and_then(lamr_of_enough_scores)] {
+                @for value in [scores.and_then(|s| s.hota), scores.and_then(|s| s.ass_a), scores.and_then(|s| s.mota), scores.and_then(|s| s.idf1), scores.and_then(lamr_of_enough_scores)] {
                     (optional_cell(value, 3))
                 }
-                @for count in [scores.map(|s| s.tp), scores.map(|s| s.fp), scores.map(|s| s.fn_), scores.map(|s| s.idsw), scores.map(|s| s.frag)] {
+                @for count in [scores.map(|s| s.tp), scores.map(|s| s.fp), scores.map(|s| s.fn_), scores.map(|s| s.idsw), scores.map(|s| s.inherited_ids), scores.map(|s| s.frag)] {
                     (optional_cell(count.map(|c| c as f64), 0))
                 }
                 @if let Some(s) = scores { td class="number" { (s.mt) " / " (s.pt) " / " (s.ml) } } @else { (no_cell()) }
@@ -154,6 +154,7 @@ fn task_head() -> Markup {
         "Frames",
         "Length [s]",
         "HOTA",
+        "AssA",
         "MOTA",
         "IDF1",
         "LAMR",
@@ -161,6 +162,7 @@ fn task_head() -> Markup {
         "FP",
         "FN",
         "IDSW",
+        "Inherited",
         "Frag",
     ];
     html! {
