@@ -2,7 +2,7 @@
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
   const SVG = "http://www.w3.org/2000/svg";
-  const COLOURS = 10;
+  const COLOURS = 20;
   let [WIDTH, HEIGHT] = data.image_px;
   let last = data.t.length - 1;
   const id = (name) => document.getElementById(name);
