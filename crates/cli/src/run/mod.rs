@@ -30,7 +30,7 @@ use tagalong_app::misfit::{COMPARE, Traits, misfit_note};
 use tagalong_app::origin::Origin;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, refused, say};
 use tagalong_app::progress::Progress;
-use tagalong_app::remedies::Remedies;
+use tagalong_app::remedies::{Remedies, reach_m};
 use tagalong_app::serialize::to_json;
 use tagalong_app::signals::Signals;
 use tagalong_app::suggest::check_log_path;
@@ -125,7 +125,7 @@ impl Job {
             None => choice::choose(args.log(), registry, &args.input)?,
         };
         let threads = args.threads.map(usize::from);
-        let (pipeline, settings) = config.pipeline_on(registry, args.seed, threads)?;
+        let (mut pipeline, settings) = config.pipeline_on(registry, args.seed, threads)?;
         let outer = args.input.applied(config.outer_for(&pipeline)?);
         let folder = args.output.clone().unwrap_or_else(|| default_folder(args, &config));
         RunDir::check(&folder, args.overwrite, args.log()).map_err(refused)?;
@@ -138,11 +138,13 @@ impl Job {
         }
         let source = FrameSource::open(args.log(), &outer.input, &outer.limits, inputs)
             .map_err(|error| refused_log(error, pipeline.config()))?;
-        // A config that the program chose is for the tracks alone; no robot follows its commands.
-        if is_named {
-            pipeline
-                .check_sources(sources_of(&source))
-                .map_err(|why| unsteered(args.log(), &why))?;
+        let unsteered = pipeline.check_sources(sources_of(&source)).err();
+        if let Some(why) = &unsteered {
+            if is_named {
+                return Err(cannot_steer(&config, args.log(), why));
+            }
+            // A config that the program chose is for the tracks alone.
+            pipeline = pipeline.without_controller().map_err(Failure::failed)?;
         }
         let resolved = outer.resolved_with(pipeline.config())?;
         let log = FileFacts { name: log_name(args), sha256: source.facts().sha256.clone() };
@@ -156,17 +158,26 @@ impl Job {
         report.notes.extend(misfit.map(|note| format!("{note}; {COMPARE}")));
         report.notes.extend(config.notes()?);
         let remedies = Remedies::new(registry);
+        if unsteered.is_some() {
+            report.notes.push(WITHOUT_COMMANDS.into());
+        }
         Ok(Self { pipeline, outer, source, resolved, folder, report, remedies })
     }
 }
 
-/// Returns the failure of a log that lacks a source of the controller, with the command that tracks the
-/// log all the same.
-fn unsteered(log: &Path, why: &MissingSource) -> Failure {
+/// Note on a log that lacks a source of the controller of the config that was chosen for it.
+const WITHOUT_COMMANDS: &str = "the log lacks what a controller needs (odometry, or a sensor of obstacles): its \
+                                people are tracked, and nobody is followed";
+
+/// Returns the failure of a log that lacks a source of the controller, with the command and the config that
+/// track the log all the same.
+pub(crate) fn cannot_steer(config: &ConfigFile, log: &Path, why: &MissingSource) -> Failure {
     let shown = log.display();
     let command = quoted(&shown.to_string());
     Failure::failed(format!(
-        "`{shown}`: {why}; `tagalong run {command}` tracks its people without commands to a robot"
+        "`{shown}`: {why}\n`tagalong run {command}` tracks its people without commands to a robot; so does a \
+         config of these two lines:\n  extends = \"{}\"\n  controller.plugin = \"none\"",
+        config.name()
     ))
 }
 
@@ -303,6 +314,7 @@ impl Desk {
         let camera = job.source.facts().camera_frame.clone();
         let names = FrameNames {
             base: input.base_frame.clone(),
+                let style = style.reaching(reach_m(job.resolved.values()).unwrap_or_default());
             odom: input.odom_frame.clone(),
             camera: camera.unwrap_or_else(|| "camera".into()),
         };
