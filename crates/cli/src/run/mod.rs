@@ -38,6 +38,7 @@ use tagalong_app::threads::threads;
 use tagalong_app::timings::Timings;
 use tagalong_app::unable::unable;
 use tagalong_config::Registry;
+use tagalong_core::Stamp;
 use tagalong_log::write::{FrameNames, FrameRecord, RunDir, RunTexts, TrackLog};
 use tagalong_log::{FrameSource, Input, Inputs, Usage};
 use tagalong_pipeline::{FrameReport, MissingSource, Pipeline, ResolvedConfig, StepError};
@@ -157,10 +158,10 @@ impl Job {
         let misfit = misfit_note(&config.name(), &[(log_name(args), misfits)]);
         report.notes.extend(misfit.map(|note| format!("{note}; {COMPARE}")));
         report.notes.extend(config.notes()?);
-        let remedies = Remedies::new(registry);
         if unsteered.is_some() {
             report.notes.push(WITHOUT_COMMANDS.into());
         }
+        let remedies = Remedies::new(registry);
         Ok(Self { pipeline, outer, source, resolved, folder, report, remedies })
     }
 }
@@ -289,12 +290,18 @@ fn ms_since(start: Instant) -> f64 {
     start.elapsed().as_secs_f64() * 1e3
 }
 
+/// Name of the time from one frame of the log to the next.
+const PERIOD: &str = "period";
+
 /// Writers and counters of the results.
 struct Desk {
     log: TrackLog,
     overlay: Option<Overlay>,
     tally: Tally,
     timings: Timings,
+    /// Times from one frame of the log to the next.
+    periods: Timings,
+    last: Option<Stamp>,
     with_images: bool,
     is_odom_known: bool,
     remedies: Remedies,
@@ -307,6 +314,7 @@ impl Desk {
             None => None,
             Some(overlaid) => {
                 let style = overlaid.style(job.outer.output.boxes);
+                let style = style.reaching(reach_m(job.resolved.values()).unwrap_or_default());
                 Some(Overlay::new(dir.overlay().map_err(refused)?, style))
             }
         };
@@ -314,7 +322,6 @@ impl Desk {
         let camera = job.source.facts().camera_frame.clone();
         let names = FrameNames {
             base: input.base_frame.clone(),
-                let style = style.reaching(reach_m(job.resolved.values()).unwrap_or_default());
             odom: input.odom_frame.clone(),
             camera: camera.unwrap_or_else(|| "camera".into()),
         };
@@ -329,6 +336,8 @@ impl Desk {
             overlay,
             tally,
             timings,
+            periods: Timings::default(),
+            last: None,
             with_images: args.with_images,
             is_odom_known: !job.source.lacks_usable_odometry(),
             remedies,
@@ -343,6 +352,10 @@ impl Desk {
             return Ok(());
         }
         self.timings.add_frame(&report.timings);
+        let last = self.last.replace(report.stamp);
+        if let Some(last) = last {
+            self.periods.add(PERIOD, 1e3 * report.stamp.seconds_since(last));
+        }
         let writing = Instant::now();
         let record = FrameRecord {
             index: report.index,
@@ -402,7 +415,10 @@ impl Desk {
         match args.format {
             _ if args.quiet => {}
             Format::Json => print(&json)?,
-            Format::Text => print(&summary::text(&report, &self.timings, &folder, args))?,
+            Format::Text => {
+                let period_ms = self.periods.summary().get(PERIOD).map(|times| times.p50_ms);
+                print(&summary::text(&report, &self.timings, period_ms, &folder, args))?;
+            }
         }
         verdict(args, &report, stopped, signals, &self.remedies)
     }
