@@ -122,6 +122,29 @@ const checkMissed = async (page, data) => {
   if (shown.i > 0) assert.ok(question.includes(`annotated person`), question);
 };
 
+// A click on an event far below shows its frame, and the list has the test that the reason names.
+const checkMissedEvents = async (page, data) => {
+  const missed = data.runs[0].events.filter((event) => event.kind === "missed").slice(0, 5);
+  for (const event of missed) {
+    await page.locator(`#event-list button[data-i="${event.i}"]`, { hasText: "missed" }).first().click();
+    const top = await page.$eval(".runs", (stage) => stage.getBoundingClientRect().top);
+    assert.ok(top >= 0 && top < page.viewportSize().height / 2, `the images are at ${top} px after a click on an event`);
+    const cause = await page.$eval("#why-0", (place) => (place.querySelector(".cause") || place).textContent);
+    const test = /the test "([^"]+)" dropped/.exec(cause);
+    const tests = await page.$$eval("#why-0 tbody th", (all) => all.map((th) => th.textContent));
+    if (test) assert.ok(tests.includes(test[1]), `${test[1]} is the reason and not among ${tests}`);
+  }
+};
+
+// A click on the plan is answered there, with an image or without.
+const checkPlanClick = async (page) => {
+  await page.locator("#plan-0").click({ position: { x: 30, y: 30 } });
+  const question = await page.textContent("#question");
+  assert.match(question, /of the robot:$|^At annotated person/, "a click on the plan asks there");
+  assert.ok((await page.textContent("#why-0")).length > 0, "and is answered");
+  await page.keyboard.press("Escape");
+};
+
 const checkPlaying = async (page) => {
   await scrub(page, 0);
   // Inside of the page, because a slow browser would come to the end before a second click.
@@ -177,6 +200,8 @@ const visit = async (browser, { way, colorScheme, viewport }) => {
     if (data.image_px[0]) await checkLayers(page, data);
     if (data.image_px[0]) await checkQuestion(page, data);
     if (data.truth) await checkMissed(page, data);
+    if (data.truth) await checkMissedEvents(page, data);
+    await checkPlanClick(page);
     await checkPlaying(page);
   } catch (error) {
     problems.push(error.message);

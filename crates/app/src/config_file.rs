@@ -200,8 +200,12 @@ impl ConfigFile {
     }
 
     /// Returns a note for each list that replaces an inherited one whole: a reader who meant to change one
-    /// setting loses all others.
+    /// setting loses all others. The config that was written with an installed network means it.
     pub fn notes(&self) -> Result<Vec<String>, Failure> {
+        let installed = installed::config_file(&self.stem());
+        if installed.is_some_and(|path| path == self.source.path()) {
+            return Ok(Vec::new());
+        }
         let replaced = self.source.document().and_then(|document| document.replaced_lists());
         let mut notes = Vec::new();
         for (list, own, inherited) in replaced.map_err(|error| self.source.mistake(&error))? {

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::{Isometry2, Point3};
 use serde::{Deserialize, Serialize};
-use tagalong_core::Funnel;
+use tagalong_core::{Dropped, Funnel, Measured};
 use tagalong_geometry::{Camera, Rect};
 use tagalong_pipeline::{
     Candidate, Fate, FrameReport, IdentityCorrection, IdentityDoubt, ObstaclePoint,
@@ -141,6 +141,59 @@ pub struct DroppedNote {
     pub count: u64,
     /// Boxes of the first of them that have a region in the image, pixels.
     pub boxes_px: Vec<[f64; 4]>,
+    /// Values that some of these boxes were dropped for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub measured: Vec<MeasuredNote>,
+}
+
+/// Value that a box was dropped for.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MeasuredNote {
+    /// Position of the box in `boxes_px`.
+    pub at: usize,
+    /// The value and its limits.
+    #[serde(flatten)]
+    pub value: MeasuredValue,
+}
+
+/// Value of a candidate, and the settings that it breaks.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MeasuredValue {
+    /// Name of the value.
+    pub what: String,
+    /// The value.
+    pub value: f64,
+    /// Settings with their values, that of the test first.
+    pub limits: Vec<(String, f64)>,
+}
+
+impl MeasuredValue {
+    fn of(measured: &Measured) -> Self {
+        let limits = measured.limits.iter().map(|(name, limit)| ((*name).to_owned(), *limit));
+        Self {
+            what: measured.what.to_owned(),
+            value: rounded(measured.value, 1e4),
+            limits: limits.collect(),
+        }
+    }
+
+    /// Returns the value against its limits, for example `cost 0.47 > refine_cost 0.4`.
+    pub fn in_words(&self) -> String {
+        let limits: Vec<String> = self
+            .limits
+            .iter()
+            .map(|(setting, limit)| {
+                let sign = if self.is_above(*limit) { ">" } else { "<" };
+                format!("{sign} {setting} {limit}")
+            })
+            .collect();
+        format!("{} {:.2} {}", self.what, self.value, limits.join(" and "))
+    }
+
+    /// Returns true if a limit must rise for the candidate to pass.
+    pub fn is_above(&self, limit: f64) -> bool {
+        self.value >= limit
+    }
 }
 
 impl FrameNotes {
@@ -236,16 +289,23 @@ impl CandidateNote {
 }
 
 fn dropped(funnel: &Funnel) -> Vec<DroppedNote> {
-    funnel
-        .entries()
-        .iter()
-        .map(|entry| DroppedNote {
-            test: entry.test.to_owned(),
-            count: entry.count,
-            // A region without an area says nothing about the place.
-            boxes_px: entry.places.iter().filter(|rect| rect.area() > 0.0).map(corners).collect(),
-        })
-        .collect()
+    funnel.entries().iter().map(dropped_note).collect()
+}
+
+fn dropped_note(entry: &Dropped) -> DroppedNote {
+    let mut boxes_px = Vec::new();
+    let mut notes = Vec::new();
+    let mut measured = entry.measured.iter().peekable();
+    for (at, rect) in entry.places.iter().enumerate() {
+        let own = measured.next_if(|(place, _)| *place == at);
+        // A region without an area says nothing about the place.
+        if rect.area() > 0.0 {
+            let at = boxes_px.len();
+            boxes_px.push(corners(rect));
+            notes.extend(own.map(|(_, own)| MeasuredNote { at, value: MeasuredValue::of(own) }));
+        }
+    }
+    DroppedNote { test: entry.test.to_owned(), count: entry.count, boxes_px, measured: notes }
 }
 
 fn corners(rect: &Rect) -> [f64; 4] {
@@ -285,6 +345,8 @@ mod tests {
             vec![candidate(Fate::Matched(TrackId(3))), candidate(Fate::Dropped("verifier"))];
         report.funnel.drop_at("head width", Rect::new(1.04, 2.0, 3.0, 4.0));
         report.funnel.drop_at("head width", Rect::default());
+        let measured = Measured { what: "width", value: 0.41, limits: vec![("widest_m", 0.36)] };
+        report.funnel.drop_measured("head width", Rect::new(5.0, 2.0, 3.0, 4.0), measured);
         report.funnel.drop_many("score", 5);
         report.ended = vec![TrackId(2)];
         report.doubts = vec![IdentityDoubt { track: TrackId(3), others: vec![TrackId(4)] }];
@@ -297,8 +359,13 @@ mod tests {
         assert_eq!(notes.candidates[0].head_odom_m, [1.0, 2.0, 1.6], "turned left, then moved");
         assert_eq!(notes.candidates[0].score, 1.235);
         assert!(notes.candidates[0].box_px[2] > 10.0, "without a box the place is projected");
-        assert_eq!(notes.dropped[0].count, 2);
-        assert_eq!(notes.dropped[0].boxes_px, [[1.0, 2.0, 3.0, 4.0]]);
+        assert_eq!(notes.dropped[0].count, 3);
+        assert_eq!(notes.dropped[0].boxes_px, [[1.0, 2.0, 3.0, 4.0], [5.0, 2.0, 3.0, 4.0]]);
+        let [measured] = &notes.dropped[0].measured[..] else { panic!("{notes:?}") };
+        assert_eq!(
+            (measured.at, measured.value.in_words().as_str()),
+            (1, "width 0.41 > widest_m 0.36")
+        );
         assert_eq!((notes.dropped[1].count, notes.dropped[1].boxes_px.len()), (5, 0));
         assert_eq!(notes.ended, [2]);
         assert_eq!(notes.doubts, [DoubtNote { id: 3, others: vec![4] }]);

@@ -68,6 +68,26 @@ impl Timings {
     }
 }
 
+/// Returns the sentence about a pipeline that takes longer for a frame than the time to the next one, in
+/// wall time; `None` for one that keeps up, and where either time is not known.
+pub fn too_slow(frame_ms: f64, period_ms: f64) -> Option<String> {
+    let is_slow = period_ms > 0.0 && frame_ms > period_ms && frame_ms.is_finite();
+    is_slow.then(|| {
+        format!(
+            "on this computer {} of {} frames a second ({frame_ms:.0} ms of wall time each, one is there every \
+             {period_ms:.0} ms): live, the others are skipped",
+            per_second(frame_ms),
+            per_second(period_ms)
+        )
+    })
+}
+
+/// Returns a rate in words: whole from ten on.
+fn per_second(ms: f64) -> String {
+    let hz = 1e3 / ms;
+    if hz < 9.95 { format!("{hz:.1}") } else { format!("{hz:.0}") }
+}
+
 impl Histogram {
     fn new() -> Self {
         Self { counts: vec![0; BINS], sum_ms: 0.0, max_ms: 0.0 }
@@ -142,6 +162,18 @@ mod tests {
         timings.add_frame(&[("track", 1.0), ("update", 2.5)]);
         let summary = timings.summary();
         assert_eq!((summary[WHOLE_FRAME].max_ms, summary["update"].max_ms), (3.5, 2.5));
+    }
+
+    #[test]
+    fn a_pipeline_that_is_slower_than_the_log_is_told_with_both_rates() {
+        let told = too_slow(512.0, 40.0).expect("a slow one");
+        assert!(
+            told.starts_with("on this computer 2.0 of 25 frames a second (512 ms of"),
+            "{told}"
+        );
+        for (frame_ms, period_ms) in [(40.0, 40.0), (10.0, 40.0), (10.0, 0.0), (f64::NAN, 40.0)] {
+            assert_eq!(too_slow(frame_ms, period_ms), None);
+        }
     }
 
     #[test]

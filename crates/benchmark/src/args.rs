@@ -146,6 +146,9 @@ pub struct ReportArgs {
     /// Output format; JSON is the text of report.json.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
+    /// Notes of the caller on the logs.
+    #[arg(skip)]
+    pub notes: Vec<String>,
 }
 
 /// Conditions under which a benchmark counts as worse than its baseline.
@@ -170,8 +173,16 @@ impl BenchArgs {
             report: ReportArgs {
                 gate: GateArgs { baseline: None, fail_if: Vec::new() },
                 format: Format::Text,
+                notes: Vec::new(),
             },
             folder: FolderArgs { output },
         }
+    }
+
+    /// Puts a note on the logs into the report.
+    #[must_use]
+    pub fn with_note(mut self, note: String) -> Self {
+        self.report.notes.push(note);
+        self
     }
 }

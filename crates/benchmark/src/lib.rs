@@ -39,7 +39,7 @@ mod watch;
 mod work;
 
 pub use args::BenchArgs;
-use args::{PlanArgs, Step};
+use args::{PlanArgs, ReportArgs, Step};
 use folder::FolderArgs;
 use gate::Gate;
 use store::Store;
@@ -68,7 +68,7 @@ pub fn bench(args: &BenchArgs, registry: &Registry) -> Outcome {
         }
         Some(Step::Report { report, folder }) => {
             let gate = Gate::read(&report.gate)?;
-            make_report(folder, report.format, gate.as_ref())?;
+            make_report(folder, report, gate.as_ref())?;
             Ok(Ended::Well)
         }
         Some(Step::Rooms(args)) => rooms::rooms(args, registry),
@@ -97,7 +97,7 @@ fn everything(args: &BenchArgs, registry: &Registry) -> Outcome {
     // A single task or shard has no complete set of results to report.
     let is_whole = args.run.task.is_none() && args.run.shard.is_none();
     if tally.signal.is_none() && is_whole {
-        make_report(&args.folder, args.report.format, gate.as_ref())?;
+        make_report(&args.folder, &args.report, gate.as_ref())?;
     }
     verdict(tally, &store)
 }
@@ -111,11 +111,12 @@ fn make_plan(args: &PlanArgs, folder: &FolderArgs, registry: &Registry) -> Resul
     Ok(text)
 }
 
-fn make_report(folder: &FolderArgs, format: Format, gate: Option<&Gate>) -> Result<(), Failure> {
+fn make_report(folder: &FolderArgs, args: &ReportArgs, gate: Option<&Gate>) -> Result<(), Failure> {
     let store = store(folder);
-    let benchmark = report::gather(&store)?;
+    let mut benchmark = report::gather(&store)?;
+    benchmark.notes.extend(args.notes.iter().cloned());
     let json = report::write(&store, &benchmark)?;
-    match format {
+    match args.format {
         Format::Text => print(&report::text(&store, &benchmark))?,
         Format::Json => print(&json)?,
     }

@@ -14,6 +14,20 @@ pub struct Dropped {
     pub example: Option<Rect>,
     /// Regions of the first ones that have one, at most [`MAX_PLACES`].
     pub places: Vec<Rect>,
+    /// Values that some of them were dropped for, by the position of the region in `places`.
+    pub measured: Vec<(usize, Measured)>,
+}
+
+/// Value of a dropped candidate, and the settings that it breaks.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measured {
+    /// Name of the value, for example `cost`.
+    pub what: &'static str,
+    /// The value.
+    pub value: f64,
+    /// Settings that it is beyond, with their values: that of the test first, then those that the same
+    /// value would break later.
+    pub limits: Vec<(&'static str, f64)>,
 }
 
 /// Largest number of regions that are kept of one test: enough for what is dropped near a person,
@@ -55,6 +69,16 @@ impl Funnel {
         self.add(test, 1, Some(region));
     }
 
+    /// Records one dropped candidate, its region, and the value that it was dropped for.
+    pub fn drop_measured(&mut self, test: &'static str, region: Rect, measured: Measured) {
+        self.add(test, 1, Some(region));
+        let entry = self.entry(test);
+        let last = entry.places.len() - 1;
+        if entry.places[last] == region && entry.measured.last().is_none_or(|one| one.0 < last) {
+            entry.measured.push((last, measured));
+        }
+    }
+
     /// Records one dropped detection, with its rectangle if it has a box in the image.
     pub fn drop_detection(&mut self, test: &'static str, detection: &Detection) {
         self.add(test, 1, detection.rect());
@@ -73,8 +97,13 @@ impl Funnel {
             let own = self.entry(entry.test);
             own.count += entry.count;
             own.example = entry.example.or(own.example);
-            let room = MAX_PLACES - own.places.len();
-            own.places.extend(entry.places.iter().take(room));
+            let known = own.places.len();
+            own.places.extend(entry.places.iter().take(MAX_PLACES - known));
+            for (at, measured) in &entry.measured {
+                if known + at < own.places.len() {
+                    own.measured.push((known + at, measured.clone()));
+                }
+            }
         }
     }
 
@@ -100,7 +129,9 @@ impl Funnel {
     /// Returns the entry of a test, a new one if it has none.
     fn entry(&mut self, test: &'static str) -> &mut Dropped {
         let index = self.entries.iter().position(|e| e.test == test).unwrap_or_else(|| {
-            self.entries.push(Dropped { test, count: 0, example: None, places: Vec::new() });
+            let places = Vec::new();
+            let measured = Vec::new();
+            self.entries.push(Dropped { test, count: 0, example: None, places, measured });
             self.entries.len() - 1
         });
         &mut self.entries[index]
@@ -140,6 +171,28 @@ mod tests {
         assert_eq!((places.len(), places[0], places[1]), (MAX_PLACES, at(-1.0), at(0.0)));
         assert_eq!(sum.count("small"), MAX_PLACES as u64 + 6);
         assert_eq!(sum.entries()[0].example, Some(at(MAX_PLACES as f64 + 4.0)));
+    }
+
+    #[test]
+    fn measured_values_stay_with_their_places() {
+        fn cost(value: f64) -> Measured {
+            Measured { what: "cost", value, limits: vec![("most_cost", 0.4)] }
+        }
+
+        let mut frame = Funnel::default();
+        frame.drop_at("bad", at(1.0));
+        frame.drop_measured("bad", at(2.0), cost(0.5));
+        let mut sum = Funnel::default();
+        sum.drop_measured("bad", at(0.0), cost(0.6));
+        sum.merge(&frame);
+        let entry = &sum.entries()[0];
+        assert_eq!((entry.count, entry.places.len()), (3, 3));
+        assert_eq!(entry.measured, [(0, cost(0.6)), (2, cost(0.5))]);
+        (0..MAX_PLACES).for_each(|x| sum.drop_measured("bad", at(x as f64), cost(0.7)));
+        sum.merge(&frame);
+        let entry = &sum.entries()[0];
+        assert_eq!(entry.measured.last(), Some(&(MAX_PLACES - 1, cost(0.7))), "no room for more");
+        assert_eq!(entry.measured.len(), MAX_PLACES - 1);
     }
 
     #[test]

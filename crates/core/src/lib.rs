@@ -63,7 +63,7 @@ pub use error::{Error, Result};
 pub use external::ExternalDetection;
 pub use filter::{Evidence, Filter, FilterRequirements, Matched, Update};
 pub use frame::{Derived, Frame, Images};
-pub use funnel::{Dropped, Funnel, MAX_PLACES, TRACKER_TESTS};
+pub use funnel::{Dropped, Funnel, MAX_PLACES, Measured, TRACKER_TESTS};
 pub use image::{DepthImage, GreyImage, Image, RgbImage};
 pub use inputs::{Capabilities, Input, Inputs, Usage};
 pub use joints::{Joint, JointName, Joints};

@@ -28,24 +28,26 @@ pub fn compare(args: &DoctorArgs, scope: Scope, registry: &Registry) -> Result<D
     for Fitting { choice, config } in found.fitting {
         // The checks are those of the first.
         let scope = Scope { with_samples: first.is_none(), ..scope };
+        // That of an installed network has the name by which `run` takes it.
+        let name = config.stem();
         let visit = Visit::make(config, scope, registry)?;
         if let Some(folder) = &args.output {
-            snapshots::write(&visit, scope, &folder.join(choice.config))?;
+            snapshots::write(&visit, scope, &folder.join(&name))?;
         }
-        rows.push(Row::of(choice, &visit.evidence, first.is_none()));
+        rows.push(Row::of(name, choice, &visit.evidence, first.is_none()));
         first.get_or_insert(visit);
     }
     let (Some(mut visit), Some(taken)) = (first, rows.first()) else {
         return Err(Failure::failed("no pipeline was tried"));
     };
-    let name = taken.config;
+    let name = taken.config.clone();
     if args.settings == Trying::Always {
         further::ask_further(&mut visit, args.settings, scope, registry);
     }
     // The other pipelines are alternatives, too, and have been tried already.
     let shown = std::mem::take(&mut visit.evidence.alternatives);
     visit.evidence.alternatives = alternatives::ranked(rows.iter().skip(1).map(Row::alternative));
-    let folder = args.output.as_ref().map(|folder| folder.join(name));
+    let folder = args.output.as_ref().map(|folder| folder.join(&name));
     let first =
         Diagnosis::of(&visit, name.into(), args, folder.as_deref(), &Remedies::new(registry))?;
     let pictures = args.output.clone();

@@ -27,6 +27,9 @@ pub struct Diagnosis {
     pub log: PathBuf,
     /// Number of examined frames.
     pub frames: u64,
+    /// Median time from one frame of the log to the next, ms.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub period_ms: Option<f64>,
     /// All pipelines that fit the log, where no config was given.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pipelines: Vec<Row>,
@@ -74,8 +77,8 @@ pub struct Drop {
 /// Pipeline in the comparison.
 #[derive(Debug, Serialize)]
 pub struct Row {
-    /// Name of the built-in config.
-    pub config: &'static str,
+    /// Name of the built-in config, or of the installed network.
+    pub config: String,
     /// True for the one that `tagalong run` takes.
     pub taken: bool,
     /// Reason for the choice of such a pipeline.
@@ -90,9 +93,9 @@ pub struct Row {
 
 impl Row {
     /// Returns the row of a pipeline after its visit.
-    pub fn of(choice: Choice, evidence: &Evidence, taken: bool) -> Self {
+    pub fn of(config: String, choice: Choice, evidence: &Evidence, taken: bool) -> Self {
         Self {
-            config: choice.config,
+            config,
             taken,
             reason: choice.reason,
             coverage: evidence.coverage.clone(),
@@ -103,7 +106,7 @@ impl Row {
 
     /// Returns the pipeline as an alternative to the one that is taken.
     pub fn alternative(&self) -> Alternative {
-        Alternative { change: alternatives::another(self.config), coverage: self.coverage.clone() }
+        Alternative { change: alternatives::another(&self.config), coverage: self.coverage.clone() }
     }
 }
 
@@ -131,6 +134,7 @@ impl Diagnosis {
             config,
             log: args.log.clone(),
             frames: evidence.trial.frames,
+            period_ms: evidence.period_ms(),
             inputs: evidence.inspection.inputs.clone(),
             findings: findings.collect(),
             coverage: evidence.coverage.clone(),

@@ -1,5 +1,6 @@
 use std::fmt::Write as _;
 
+use tagalong_app::timings::too_slow;
 use tagalong_math::counted;
 
 use super::coverage::{Alternative, Coverage};
@@ -27,6 +28,10 @@ pub fn text(diagnosis: &Diagnosis) -> String {
         out.push('\n');
     }
     diagnosis.findings.iter().for_each(|found| finding(&mut out, found));
+    if let Some(slow) = diagnosis.period_ms.and_then(|ms| too_slow(diagnosis.coverage.frame_ms, ms))
+    {
+        let _ = writeln!(out, "\n{slow}; `tagalong doctor LOG` prints the time of each pipeline");
+    }
     settings(&mut out, diagnosis);
     if let Some(folder) = &diagnosis.pictures {
         let _ = writeln!(out, "\npictures of frames with their tracks: {}", folder.display());
@@ -57,9 +62,10 @@ fn pipelines(out: &mut String, diagnosis: &Diagnosis) {
         let _ = writeln!(out, "  {:>w$}  {:>7}  network: {why}", "-", "-", w = heading().len());
     }
     let _ = writeln!(out, "{}", legend(&diagnosis.coverage));
+    slow(out, diagnosis);
     if let Some(taken) = diagnosis.pipelines.iter().find(|row| row.taken) {
         let contents = &diagnosis.contents;
-        let name = taken.config;
+        let name = &taken.config;
         let why = taken.reason;
         let _ =
             writeln!(out, "\nthe log has {contents}: `tagalong run` takes {name}, because {why}");
@@ -68,6 +74,21 @@ fn pipelines(out: &mut String, diagnosis: &Diagnosis) {
         }
         better(out, taken, &diagnosis.pipelines);
         out.push('\n');
+    }
+}
+
+/// Writes which pipelines take longer for a frame than the log has for it.
+fn slow(out: &mut String, diagnosis: &Diagnosis) {
+    let Some(period_ms) = diagnosis.period_ms else { return };
+    let slow = diagnosis.pipelines.iter().filter(|row| row.frame_ms > period_ms);
+    let names: Vec<&str> = slow.map(|row| row.config.as_str()).collect();
+    if !names.is_empty() {
+        let _ = writeln!(
+            out,
+            "  ms: wall time a frame on this computer; the log has a frame every {period_ms:.0} ms: live, {} \
+             would skip some",
+            names.join(", ")
+        );
     }
 }
 
@@ -84,7 +105,7 @@ fn better(out: &mut String, taken: &Row, rows: &[Row]) {
     let Some(best_found) = best.coverage.found() else { return };
     let Some(taken_found) = taken.coverage.found() else { return };
     if best_found > taken_found {
-        let name = best.config;
+        let name = &best.config;
         let _ = writeln!(
             out,
             "{name} misses fewer shapes here ({} against {}); identities are not measured: compare with \
@@ -180,8 +201,9 @@ mod tests {
     use super::*;
 
     /// Returns the row of a pipeline with so many moving tracks and so many of 100 shapes missed.
-    fn row(config: &'static str, moving: usize, unexplained: usize) -> Row {
+    fn row(config: &str, moving: usize, unexplained: usize) -> Row {
         let coverage = Coverage { moving, blobs: 100, unexplained, ..Coverage::default() };
+        let config = config.to_owned();
         Row { config, taken: false, reason: "", coverage, frame_ms: 1.0, failure: None }
     }
 
@@ -190,6 +212,19 @@ mod tests {
         let rows = [taken, other];
         better(&mut out, &rows[0], &rows);
         out
+    }
+
+    #[test]
+    fn pipelines_that_are_slower_than_the_log_are_named() {
+        let mut out = String::new();
+        let quick = row("quick", 1, 0);
+        let late = Row { frame_ms: 50.0, ..row("late", 1, 0) };
+        let mut diagnosis = Diagnosis { pipelines: vec![quick, late], ..Diagnosis::default() };
+        slow(&mut out, &diagnosis);
+        assert_eq!(out, "", "the rate of the log is not known");
+        diagnosis.period_ms = Some(40.0);
+        slow(&mut out, &diagnosis);
+        assert!(out.contains("every 40 ms: live, late would skip some"), "{out}");
     }
 
     #[test]

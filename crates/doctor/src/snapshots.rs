@@ -5,6 +5,7 @@ use std::path::Path;
 
 use tagalong_app::outcome::{Failure, make_folder};
 use tagalong_app::progress::Progress;
+use tagalong_app::remedies::reach_m;
 use tagalong_log::{FrameSource, Input};
 use tagalong_render::{Overlay, OverlayData, OverlayStyle};
 
@@ -31,7 +32,8 @@ pub fn write(visit: &Visit, scope: Scope, folder: &Path) -> Result<(), Failure> 
     let Ok(mut frames) = FrameSource::open(scope.log, input, limits, inputs) else {
         return Ok(());
     };
-    let style = OverlayStyle::debug(visit.outer.output.boxes);
+    let reach_m = reach_m(visit.pipeline.config().values()).unwrap_or_default();
+    let style = OverlayStyle::debug(visit.outer.output.boxes).reaching(reach_m);
     let mut overlay = Overlay::new(folder.to_owned(), style);
     let progress = Progress::titled("pictures");
     for report in reports {

@@ -129,7 +129,8 @@ impl Pipeline {
         check_detectors(&detectors, &places)?;
         check_weighing(&filter, &detectors, filter_span)?;
         let describer = builder.describer(&root)?;
-        let steering = builder.steering(root.remove("controller"), &describer)?;
+        let controller = root.remove("controller").filter(|section| !leaves_out(section));
+        let steering = builder.steering(controller, &describer)?;
         let plugins: Vec<Declared<'_>> = detectors
             .iter()
             .map(|slot| (&*slot.settings.plugin, slot.plugin.plugin().capabilities().inputs))
@@ -180,6 +181,17 @@ impl Pipeline {
             failed: None,
         })
     }
+}
+
+/// Name in place of a controller's that leaves an inherited one out.
+const NO_CONTROLLER: &str = "none";
+
+/// Returns true for a section that names no plugin, so that a config without a controller can extend one
+/// that has it.
+fn leaves_out(section: &Value<'_>) -> bool {
+    let table = section.get_ref().as_table();
+    let plugin = table.and_then(|table| table.get("plugin")?.get_ref().as_str());
+    plugin == Some(NO_CONTROLLER)
 }
 
 fn refuse_unknown(root: &DeTable<'_>, options: &Options) -> Result<(), ConfigError> {

@@ -1,3 +1,4 @@
+use tagalong_config::ConfigError;
 use tagalong_following::{ObstacleSource, OdometrySource};
 
 use crate::Pipeline;
@@ -22,15 +23,15 @@ pub enum MissingSource {
     /// Nothing shows obstacles.
     #[error(
         "the controller has no sensor of obstacles: there is neither depth nor a laser scan that the \
-         pipeline uses; add one, remove [controller] where it is written, or, for a robot that is to \
-         drive without eyes, set `obstacles = \"none\"` in [collision_monitor]"
+         pipeline uses; add one; or leave the controller out, by `plugin = \"none\"` in [controller]; or, \
+         for a robot that is to drive without eyes, set `obstacles = \"none\"` in [collision_monitor]"
     )]
     Obstacles,
     /// Nothing shows the robot's motion.
     #[error(
         "the controller has no odometry: add a topic of it or a transform from the odometry frame to \
-         the robot, remove [controller] where it is written, or, for a robot that is to drive without, \
-         set `odometry = \"none\"` in [robot]"
+         the robot; or leave the controller out, by `plugin = \"none\"` in [controller]; or, for a robot \
+         that is to drive without, set `odometry = \"none\"` in [robot]"
     )]
     Odometry,
 }
@@ -55,5 +56,15 @@ impl Pipeline {
             return Err(MissingSource::Odometry);
         }
         Ok(())
+    }
+
+    /// Leaves the controller out, to track the people of a source without the data that it needs.
+    ///
+    /// # Errors
+    /// A config that cannot be written as TOML any more.
+    pub fn without_controller(mut self) -> Result<Self, ConfigError> {
+        self.steering = None;
+        self.config.remove("controller")?;
+        Ok(self)
     }
 }

@@ -5,13 +5,13 @@ use tagalong_geometry::Rect;
 use super::canvas::{Canvas, Ink, LINE_PX, Lettering};
 use super::data::OverlayData;
 use super::labels::Labels;
-use super::style::{OverlayStyle, colour, colour_of};
+use super::style::{LEAST_REACH_M, OverlayStyle, colour, colour_of};
 use super::trails::Trails;
 
-/// Reach of the view ahead of the robot and behind it, m.
-const REACH_M: [f64; 2] = [8.0, 1.0];
+/// Reach of the view behind the robot, as a part of that ahead.
+const BEHIND: f64 = 0.125;
 
-/// The same where people are seen on all sides, m.
+/// Reach of the view ahead of the robot and behind it where people are seen on all sides, m.
 const REACH_AROUND_M: [f64; 2] = [5.0, 4.0];
 
 /// Half the side of the square around a person that labels spare, pixels.
@@ -40,8 +40,9 @@ struct Plan {
 }
 
 impl Plan {
-    fn new(height: usize, is_around: bool) -> Self {
-        let reach_m = if is_around { REACH_AROUND_M } else { REACH_M };
+    fn new(height: usize, is_around: bool, style: OverlayStyle) -> Self {
+        let ahead_m = f64::from(style.reach_m.max(LEAST_REACH_M));
+        let reach_m = if is_around { REACH_AROUND_M } else { [ahead_m, BEHIND * ahead_m] };
         let [ahead_m, behind_m] = reach_m;
         let px_per_m = height as f64 / (ahead_m + behind_m);
         let width = width_px(height) as f64;
@@ -72,7 +73,7 @@ impl Plan {
 
 /// Renders the people from above, `height` pixels high.
 pub fn draw(scene: &OverlayData, trails: &Trails, style: OverlayStyle, height: usize) -> Canvas {
-    let plan = Plan::new(height, scene.is_around);
+    let plan = Plan::new(height, scene.is_around, style);
     let mut canvas = Canvas::new(width_px(height), height, GROUND_RGB);
     draw_grid(&mut canvas, &plan);
     // A frame without an image has a camera that sees nothing.
@@ -118,7 +119,7 @@ fn labels(scene: &OverlayData, plan: &Plan, style: OverlayStyle, height: usize) 
 /// Returns the IDs of a scene as they are placed.
 #[cfg(test)]
 pub fn placed_ids(scene: &OverlayData, style: OverlayStyle, height: usize) -> Labels {
-    labels(scene, &Plan::new(height, scene.is_around), style, height)
+    labels(scene, &Plan::new(height, scene.is_around, style), style, height)
 }
 
 /// Returns the words that explain the view, with their places.
@@ -161,8 +162,8 @@ fn draw_field_of_view(canvas: &mut Canvas, plan: &Plan, scene: &OverlayData) {
     for column in [0.0, camera.width as f64 - 1.0] {
         let ray = camera.ray(Point2::new(column, 0.5 * camera.height as f64));
         let ray_in_robot = camera.robot_from_camera.rotation * ray;
-        // 12 m reach beyond the corners of the view.
-        let end = eye + ray_in_robot * 12.0;
+        // Beyond the corners of the view.
+        let end = eye + ray_in_robot * (1.5 * plan.reach_m[0]);
         canvas.line(plan.of(&eye), plan.of(&end), VIEW);
     }
 }

@@ -12,7 +12,15 @@ pub struct OverlayStyle {
     pub detail: Detail,
     /// Part of a person that boxes enclose.
     pub boxes: BoxedPart,
+    /// Reach of the plan ahead of the robot, m; less than [`LEAST_REACH_M`] is that.
+    pub reach_m: u16,
 }
+
+/// Least reach of the plan ahead of the robot, m.
+pub(crate) const LEAST_REACH_M: u16 = 8;
+
+/// Largest one, m: beyond, people would be a few pixels apart.
+const MOST_REACH_M: u16 = 30;
 
 /// Parts that a picture shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -27,7 +35,16 @@ pub enum Detail {
 impl OverlayStyle {
     /// Returns the style that shows dropped candidates and the state of the filter.
     pub fn debug(boxes: BoxedPart) -> Self {
-        Self { detail: Detail::Debug, boxes }
+        Self { detail: Detail::Debug, boxes, ..Self::default() }
+    }
+
+    /// Returns the style with a plan that shows people as far away as a pipeline finds them.
+    #[must_use]
+    pub fn reaching(self, metres: f64) -> Self {
+        // Every second line of the plan has a number.
+        let reach_m = 2.0 * (metres / 2.0).ceil();
+        let reach_m = (reach_m as u16).clamp(LEAST_REACH_M, MOST_REACH_M);
+        Self { reach_m, ..self }
     }
 
     pub(super) fn is_debug(self) -> bool {

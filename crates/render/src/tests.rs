@@ -11,8 +11,9 @@ use tagalong_vision::{Silhouette, Sketch, SketchMap, SketchPoint};
 use super::canvas::LINE_PX;
 use super::*;
 
-const CALM: OverlayStyle = OverlayStyle { detail: Detail::People, boxes: BoxedPart::Upper };
-const DEBUG: OverlayStyle = OverlayStyle { detail: Detail::Debug, boxes: BoxedPart::Upper };
+const CALM: OverlayStyle =
+    OverlayStyle { detail: Detail::People, boxes: BoxedPart::Upper, reach_m: 8 };
+const DEBUG: OverlayStyle = OverlayStyle { detail: Detail::Debug, ..CALM };
 
 fn track(id: u32, camera: &Camera) -> Track {
     let person = Person { position: Point3::new(3.0, 0.4, 1.6), velocity: Vector2::new(0.5, 0.0) };
@@ -129,6 +130,21 @@ fn a_person_behind_the_robot_is_in_the_plan_of_a_lidar_and_has_no_label_in_the_i
         });
         let pixels = changed(&with, &without, 0..360, 380..420);
         assert_eq!(pixels > 20, is_around, "{pixels}");
+    }
+}
+
+#[test]
+fn the_plan_reaches_as_far_as_the_pipeline() {
+    let mut far = scene(&[1], Vec::new());
+    far.report.tracks[0].estimate.person.position.x = 12.0;
+    for (reach_m, ahead_m, is_there) in
+        [(0.0, 8, false), (5.5, 8, false), (15.0, 16, true), (99.0, 30, true)]
+    {
+        let style = OverlayStyle::default().reaching(reach_m);
+        assert_eq!(style.reach_m, ahead_m);
+        let [with, without] = [&far, &scene(&[], Vec::new())]
+            .map(|scene| plan_view::draw(scene, &Trails::default(), style, 450).into_image());
+        assert_eq!(with != without, is_there, "{reach_m} m");
     }
 }
 

@@ -96,7 +96,11 @@ impl PageTruth {
         run.hits = Some(hits);
         add_missed(&find_missed(&sequence, &prepared, &matches, witness, rules), run);
         let happened = events(&prepared, &matches);
-        run.events.extend(happened.iter().filter_map(described));
+        let found_at = matches.iter().position(|pairs| !pairs.is_empty());
+        let (early, rest): (Vec<&Event>, Vec<&Event>) =
+            happened.iter().partition(|event| is_early_miss(event, found_at));
+        run.events.extend(missed_early(&early));
+        run.events.extend(rest.into_iter().filter_map(described));
         run.events.sort_by_key(|event| event.i);
         Ok(())
     }
@@ -154,6 +158,41 @@ fn reports(frame: &FrameData, size: [usize; 2]) -> Vec<Report> {
     reports.collect()
 }
 
+/// Returns true for a miss before the first person is found: no track can be confirmed at once.
+fn is_early_miss(event: &Event, found_at: Option<usize>) -> bool {
+    matches!(event.kind, EventKind::Miss { .. }) && found_at.is_none_or(|at| event.frame <= at)
+}
+
+/// Describes the misses before the first person is found, frame by frame: those of one frame are one event.
+fn missed_early(early: &[&Event]) -> Vec<EventData> {
+    let mut told = Vec::new();
+    for of_frame in early.chunk_by(|a, b| a.frame == b.frame) {
+        let [_, _, ..] = of_frame else {
+            told.extend(of_frame.iter().filter_map(|event| described(event)));
+            continue;
+        };
+        let people: Vec<i64> = of_frame
+            .iter()
+            .filter_map(|event| match event.kind {
+                EventKind::Miss { person, .. } => Some(person),
+                _ => None,
+            })
+            .collect();
+        let ids: Vec<String> = people.iter().map(i64::to_string).collect();
+        told.push(EventData {
+            i: of_frame[0].frame.saturating_sub(1),
+            kind: "missed",
+            track: None,
+            person: people.first().copied(),
+            text: format!(
+                "annotated people {} are missed: no track is confirmed yet",
+                ids.join(", ")
+            ),
+        });
+    }
+    told
+}
+
 /// Describes an event of the comparison; people found again are told by the run itself.
 fn described(event: &Event) -> Option<EventData> {
     let (kind, person, track, text) = match event.kind {
@@ -204,6 +243,29 @@ mod tests {
                 .collect(),
             ..RunData::default()
         }
+    }
+
+    #[test]
+    fn misses_of_one_frame_before_anybody_is_found_are_one_event() {
+        fn miss(frame: usize, person: i64) -> Event {
+            let kind = EventKind::Miss { person, track: None };
+            Event { frame, stamp_ns: 0, kind }
+        }
+
+        let all = [miss(1, 4), miss(1, 7), miss(2, 9), miss(3, 5), miss(3, 6)];
+        let early: Vec<&Event> = all.iter().filter(|event| is_early_miss(event, Some(2))).collect();
+        assert_eq!(early.len(), 3, "somebody is found in the third frame");
+        assert!(is_early_miss(&all[4], None), "nobody is ever found");
+        let told = missed_early(&early);
+        let texts: Vec<&str> = told.iter().map(|event| event.text.as_str()).collect();
+        assert_eq!(
+            texts,
+            [
+                "annotated people 4, 7 are missed: no track is confirmed yet",
+                "annotated person 9 is missed"
+            ]
+        );
+        assert_eq!((told[0].i, told[0].person), (0, Some(4)));
     }
 
     #[test]

@@ -13,7 +13,9 @@ pub mod tests_named {
     pub const WIDTH: &str = "head width";
     /// Nothing like a body below.
     pub const BODY: &str = "body below";
-    /// The silhouette does not fit.
+    /// The silhouette fits so badly at a cell that nobody looks closer.
+    pub const REFINE: &str = "not refined";
+    /// The silhouette does not fit where it fits best.
     pub const COST: &str = "template cost";
     /// Too few cells agree.
     pub const SIZE: &str = "component size";

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use tagalong_config::check_settings;
 use tagalong_core::{
     Capabilities, DepthImage, Detection, Detector, Error, Frame, Funnel, Input, Inputs, Likelihood,
-    Query, Result, Track,
+    Measured, Query, Result, Track,
 };
 use tagalong_geometry::{HEAD_RADIUS_M, ImageBox, Rect};
 use tagalong_vision::RowSums;
@@ -13,6 +13,7 @@ use crate::NAME;
 use crate::bank::{Bank, Pose};
 use crate::candidates::{body_below, boundary, head_width_m, is_below_something, tests_named};
 use crate::config::{Cost, DepthTemplateConfig};
+use crate::drops::{Against, Drops, Failed};
 use crate::extension::{FrameComparison, SceneLikelihood, SilhouetteComparison};
 use crate::matching::{Match, Matcher};
 use crate::people::{Cell, group, weighted_centre};
@@ -96,19 +97,21 @@ impl DepthTemplate {
     }
 
     /// Looks at the cells of a window and keeps those that `admit` lets through
-    /// and where a silhouette fits well enough to look closer.
+    /// and where a silhouette fits well enough to look closer. `later` is the limit of the cost after
+    /// that.
     fn scan(
         &mut self,
         scene: &PreparedFrame<'_>,
         window: &Rect,
+        later: (&'static str, f64),
         funnel: &mut Funnel,
-        admit: impl Fn(&Self, &Local) -> std::result::Result<(), &'static str>,
+        admit: impl Fn(&Self, &Local) -> std::result::Result<(), Failed>,
     ) {
         let PreparedFrame { rows, view, .. } = scene;
         let inside = window.clipped(rows.width(), rows.height());
         let x0 = on_grid(inside.x);
         let y0 = on_grid(inside.y);
-        let mut dropped = Tests::default();
+        let mut dropped = Drops::default();
         for y in (y0..inside.bottom().ceil() as i64).step_by(MetricImage::GRID as usize) {
             for x in (x0..inside.right().ceil() as i64).step_by(MetricImage::GRID as usize) {
                 let Some(depth_m) = rows.depth_m(x, y) else { continue };
@@ -118,12 +121,12 @@ impl DepthTemplate {
                     continue;
                 }
                 if !self.in_volume(depth_m, view.head_height_m(x, y, depth_m)) {
-                    dropped.add(tests_named::VOLUME, x, y, depth_m);
+                    dropped.add(Failed::at(tests_named::VOLUME), view, (x, y), depth_m);
                     continue;
                 }
                 let local = view.local(x, y, depth_m);
-                if let Err(test) = admit(self, &local) {
-                    dropped.add(test, x, y, depth_m);
+                if let Err(failed) = admit(self, &local) {
+                    dropped.add(failed, view, (x, y), depth_m);
                     continue;
                 }
                 let most = self.config.refine_cost;
@@ -132,11 +135,42 @@ impl DepthTemplate {
                         let head = view.head(x as f64, y as f64, depth_m);
                         self.cells.push(Cell { x, y, depth_m, cost: fit.cost, head });
                     }
-                    None => dropped.add(tests_named::COST, x, y, depth_m),
+                    None => dropped.add(Failed::at(tests_named::REFINE), view, (x, y), depth_m),
                 }
             }
         }
+        // Few places: the fit at a dropped cell stopped where it cost too much.
+        for place in dropped.places_of(tests_named::REFINE) {
+            let local = view.local(place.x, place.y, place.depth_m);
+            place.measured = self.unrefined(scene, &local, later);
+        }
         dropped.report(view, funnel);
+    }
+
+    /// Returns what keeps a cell from being looked at more closely: the cost of its silhouette, with
+    /// the limit that this cost would break after that, or the part of the silhouette with a reading.
+    fn unrefined(
+        &mut self,
+        scene: &PreparedFrame<'_>,
+        local: &Local,
+        later: (&'static str, f64),
+    ) -> Option<Measured> {
+        if let Some(fit) = self.best(scene, local, f64::INFINITY) {
+            let mut limits = vec![("refine_cost", self.config.refine_cost)];
+            limits.extend((fit.cost > later.1).then_some(later));
+            return Some(Measured { what: "cost", value: fit.cost, limits });
+        }
+        if scene.replaced.is_some() {
+            return None;
+        }
+        let mut value: f64 = 0.0;
+        for direction in &self.config.directions {
+            let pose = Pose::nearest(*direction, local.pitch_rad, local.roll_rad, local.px_per_m);
+            let template = self.bank.template(pose);
+            value = value.max(scene.matcher.valid_part(scene.rows, template, (local.x, local.y)));
+        }
+        let setting = ("min_foreground_valid", self.config.min_foreground_valid);
+        Some(Against { what: "part with depth", value, setting }.measured())
     }
 
     /// The view of this frame's camera; it seldom changes.
@@ -154,20 +188,25 @@ impl DepthTemplate {
     }
 
     /// P4's tests of a newcomer, cheapest first.
-    fn admit_newcomer(
-        &self,
-        rows: &RowSums,
-        local: &Local,
-    ) -> std::result::Result<(), &'static str> {
-        if !boundary(rows, local, &self.config) {
-            return Err(tests_named::BOUNDARY);
+    fn admit_newcomer(&self, rows: &RowSums, local: &Local) -> std::result::Result<(), Failed> {
+        let c = &self.config;
+        if !boundary(rows, local, c) {
+            return Err(Failed::at(tests_named::BOUNDARY));
         }
-        let widths = self.config.min_head_width_m..=self.config.max_head_width_m;
-        if !widths.contains(&head_width_m(rows, local)) {
-            return Err(tests_named::WIDTH);
+        let width_m = head_width_m(rows, local);
+        if !(c.min_head_width_m..=c.max_head_width_m).contains(&width_m) {
+            let setting = if width_m < c.min_head_width_m {
+                ("min_head_width_m", c.min_head_width_m)
+            } else {
+                ("max_head_width_m", c.max_head_width_m)
+            };
+            let against = Against { what: "width", value: width_m, setting };
+            return Err(Failed { test: tests_named::WIDTH, against: Some(against) });
         }
-        if body_below(rows, local) < self.config.min_body {
-            return Err(tests_named::BODY);
+        let body = body_below(rows, local);
+        if body < c.min_body {
+            let against = Against { what: "body", value: body, setting: ("min_body", c.min_body) };
+            return Err(Failed { test: tests_named::BODY, against: Some(against) });
         }
         Ok(())
     }
@@ -231,18 +270,21 @@ impl DepthTemplate {
     ) -> Result<Vec<Detection>> {
         self.cells.clear();
         let everywhere = Rect::new(0.0, 0.0, scene.rows.width() as f64, scene.rows.height() as f64);
-        let limit = self.config.discover_cost;
-        self.scan(scene, &everywhere, funnel, |this, l| this.admit_newcomer(scene.rows, l));
+        let limit = ("discover_cost", self.config.discover_cost);
+        self.scan(scene, &everywhere, limit, funnel, |this, l| this.admit_newcomer(scene.rows, l));
         let mut found = Vec::new();
         for group in group(&mut self.cells, self.config.min_separation_m) {
             let person = self.refined(scene, &group.best);
             let at = scene.view.region(person.x, person.y, person.depth_m);
             if group.cells < self.config.min_cells {
-                funnel.drop_at(tests_named::SIZE, at);
+                let value = f64::from(group.cells);
+                let setting = ("min_cells", f64::from(self.config.min_cells));
+                let against = Against { what: "cells", value, setting };
+                funnel.drop_measured(tests_named::SIZE, at, against.measured());
                 continue;
             }
-            if person.cost > limit {
-                funnel.drop_at(tests_named::COST, at);
+            if person.cost > limit.1 {
+                funnel.drop_measured(tests_named::COST, at, too_costly(&person, limit));
                 continue;
             }
             let detection = self.detection(frame, scene, &person)?;
@@ -274,22 +316,26 @@ impl DepthTemplate {
         let reach = radius_m * scene.view.px_per_m(face_m);
         let window = Rect::new(centre.x - reach, centre.y - reach, 2.0 * reach, 2.0 * reach);
         let c = &self.config;
-        let limit = if track.confirmed { c.follow_cost } else { c.discover_cost };
-        self.scan(scene, &window, funnel, |this, local| {
+        let limit = if track.confirmed {
+            ("follow_cost", c.follow_cost)
+        } else {
+            ("discover_cost", c.discover_cost)
+        };
+        self.scan(scene, &window, limit, funnel, |this, local| {
             let head = scene.view.head(local.x as f64, local.y as f64, local.depth_m);
             if (head.xy() - expected.xy()).norm() > radius_m {
-                return Err(tests_named::WINDOW);
+                return Err(Failed::at(tests_named::WINDOW));
             }
             let is_below = is_below_something(scene.rows, local, &this.config);
-            if is_below { Err(tests_named::BOUNDARY) } else { Ok(()) }
+            if is_below { Err(Failed::at(tests_named::BOUNDARY)) } else { Ok(()) }
         });
         let Some(best) = group(&mut self.cells, 2.0 * radius_m).into_iter().next() else {
             return Ok(Vec::new());
         };
         let person = self.refined(scene, &best.best);
-        if person.cost > limit {
+        if person.cost > limit.1 {
             let at = scene.view.region(person.x, person.y, person.depth_m);
-            funnel.drop_at(tests_named::COST, at);
+            funnel.drop_measured(tests_named::COST, at, too_costly(&person, limit));
             return Ok(Vec::new());
         }
         Ok(vec![self.detection(frame, scene, &person)?])
@@ -358,6 +404,11 @@ impl Detector for DepthTemplate {
     }
 }
 
+/// Returns the cost of a silhouette that is beyond a limit.
+fn too_costly(person: &Fitted, setting: (&'static str, f64)) -> Measured {
+    Against { what: "cost", value: person.cost, setting }.measured()
+}
+
 /// The last coordinate of the grid up to `at`.
 fn on_grid(at: f64) -> i64 {
     at as i64 / MetricImage::GRID * MetricImage::GRID
@@ -369,31 +420,6 @@ fn spacing(px_per_m: f64) -> i64 {
         px if px >= 8.0 => 8,
         px if px >= 4.0 => 4,
         _ => 2,
-    }
-}
-
-/// Candidates dropped by the tests of one scan; an example is worked out at the end.
-#[derive(Default)]
-struct Tests {
-    entries: Vec<(&'static str, u64, (i64, i64, f64))>,
-}
-
-impl Tests {
-    fn add(&mut self, test: &'static str, x: i64, y: i64, depth_m: f64) {
-        match self.entries.iter_mut().find(|(name, ..)| *name == test) {
-            Some((_, count, last)) => {
-                *count += 1;
-                *last = (x, y, depth_m);
-            }
-            None => self.entries.push((test, 1, (x, y, depth_m))),
-        }
-    }
-
-    fn report(&self, view: &MetricImage, funnel: &mut Funnel) {
-        for (test, count, (x, y, depth_m)) in &self.entries {
-            funnel.drop_at(test, view.region(*x as f64, *y as f64, *depth_m));
-            funnel.drop_many(test, count - 1);
-        }
     }
 }
 

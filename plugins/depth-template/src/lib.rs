@@ -17,6 +17,7 @@ mod body;
 mod candidates;
 mod config;
 mod detector;
+mod drops;
 mod extension;
 mod matching;
 mod people;
@@ -64,6 +65,11 @@ const REMEDIES: &[Remedy] = &[
         test: "search window",
         settings: &["follow_radius_m"],
         look: "places too far from where a person was expected",
+    },
+    Remedy {
+        test: "not refined",
+        settings: &["refine_cost", "discover_cost"],
+        look: "silhouettes that cost too much at the first look; larger finds more people and more furniture",
     },
     Remedy {
         test: "component size",

@@ -197,6 +197,22 @@ impl Matcher {
         Some(Match { cost, foreground_valid })
     }
 
+    /// Returns the part of the person's pixels that have a reading, for a head centre on the reduced pixel
+    /// (`x`, `y`).
+    pub fn valid_part(&self, rows: &RowSums, template: &Template, (x, y): (i64, i64)) -> f64 {
+        let width = rows.width() as i64;
+        let mut valid = 0;
+        for row in &template.rows {
+            let Some(line) = usize::try_from(y + row.dy).ok().filter(|l| *l < rows.height()) else {
+                continue;
+            };
+            let [first, end] =
+                [x + row.from, x + row.to].map(|column| column.clamp(0, width) as usize);
+            valid += rows.run(line, first, end).count;
+        }
+        f64::from(valid) / template.person.max(1.0)
+    }
+
     /// Returns the cost of the collected sums; `holes` are pixels of the person without a reading
     /// that are too many.
     fn robust_cost(&self, tally: &Tally, template: &Template, holes: f64) -> f64 {

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix5, Point3, Vector2};
 use tagalong_core::{
-    DepthImage, Detection, Detector, EgoMotion, Estimate, Frame, Funnel, Images, Person, Query,
-    Stamp, Track, TrackId,
+    DepthImage, Detection, Detector, EgoMotion, Estimate, Frame, Funnel, Images, Measured, Person,
+    Query, Stamp, Track, TrackId,
 };
 use tagalong_depth_template::{Cost, DepthTemplate, DepthTemplateConfig, render};
 use tagalong_geometry::{Camera, HEAD_RADIUS_M, Pinhole};
@@ -71,6 +71,75 @@ fn the_centre_of_the_head_is_as_far_behind_its_surface_as_told() {
         frame.camera.depth_of(&discover(config, &frame).0[0].position)
     });
     assert!((far_m - near_m - 0.05).abs() < 1e-9);
+}
+
+/// Returns the least cost above the limit of looking closer, with the settings that it breaks.
+fn least_unrefined(funnel: &Funnel) -> Measured {
+    let of_test = funnel.entries().iter().find(|entry| entry.test == "not refined");
+    let measured = of_test.expect("cells that are not refined").measured.iter().map(|one| &one.1);
+    measured.min_by(|a, b| a.value.total_cmp(&b.value)).expect("a measured one").clone()
+}
+
+#[test]
+fn what_is_not_looked_at_more_closely_tells_its_cost_and_the_limits_that_let_it_pass() {
+    let scene = frame(640, 3.5, &[Point3::new(2.5, 0.0, 1.6)]);
+    let strict =
+        DepthTemplateConfig { refine_cost: 1e-3, discover_cost: 1e-3, ..Default::default() };
+    let (found, funnel) = discover(strict.clone(), &scene);
+    assert!(found.is_empty() && funnel.count("template cost") == 0, "{funnel:?}");
+    let Measured { what, value, limits } = least_unrefined(&funnel);
+    assert_eq!(what, "cost");
+    assert_eq!(limits, [("refine_cost", 1e-3), ("discover_cost", 1e-3)]);
+    let passing = value + 1e-6;
+    let refine = DepthTemplateConfig { refine_cost: passing, ..strict };
+    let (found, funnel) = discover(refine.clone(), &scene);
+    assert!(found.is_empty() && funnel.count("not refined") > 0, "others still cost more");
+    let both = DepthTemplateConfig { discover_cost: passing, min_cells: 1, ..refine };
+    assert_eq!(discover(both, &scene).0.len(), 1);
+    let lenient =
+        DepthTemplateConfig { discover_cost: 1.0, refine_cost: 1e-3, ..Default::default() };
+    let limits = least_unrefined(&discover(lenient, &scene).1).limits;
+    assert_eq!(limits, [("refine_cost", 1e-3)], "the other one would let it pass");
+}
+
+#[test]
+fn a_silhouette_without_enough_readings_tells_their_part() {
+    let scene = frame(320, 5.0, &[Point3::new(2.5, 0.0, 1.6)]);
+    let depth = scene.depth().unwrap();
+    let holes = DepthImage::from_fn(depth.width(), depth.height(), |x, y| {
+        // Rows below the chin have no reading.
+        let is_body = y > depth.height() / 3;
+        if is_body { f32::NAN } else { depth.get(x as i64, y as i64).unwrap_or(f32::NAN) }
+    });
+    let images = Images { depth: Some(Arc::new(holes)), ..Images::default() };
+    let scene = Frame::new(1, Stamp::from_nanos(1), camera(320), EgoMotion::at_rest(0.1), images);
+    let config = DepthTemplateConfig { min_body: 0.0, ..Default::default() };
+    let (_, funnel) = discover(config, &scene);
+    let Measured { what, value, limits } = least_unrefined(&funnel);
+    assert_eq!((what, limits), ("part with depth", vec![("min_foreground_valid", 0.5)]));
+    assert!(value > 0.02 && value < 0.5, "{value}");
+}
+
+#[test]
+fn a_candidate_that_fails_a_limit_tells_its_value() {
+    let scene = frame(640, 3.5, &[Point3::new(2.5, 0.0, 1.6)]);
+    let wide =
+        DepthTemplateConfig { min_head_width_m: 0.3, max_head_width_m: 0.36, ..Default::default() };
+    let strict = DepthTemplateConfig { min_body: 1.01, ..Default::default() };
+    let costly = DepthTemplateConfig { discover_cost: 1e-3, ..Default::default() };
+    let many = DepthTemplateConfig { min_cells: 1000, ..Default::default() };
+    for (config, test, what, setting) in [
+        (wide, "head width", "width", "min_head_width_m"),
+        (strict, "body below", "body", "min_body"),
+        (costly, "template cost", "cost", "discover_cost"),
+        (many, "component size", "cells", "min_cells"),
+    ] {
+        let (_, funnel) = discover(config, &scene);
+        let entry = funnel.entries().iter().find(|entry| entry.test == test).expect(test);
+        let (_, measured) = entry.measured.first().expect(test);
+        assert_eq!((measured.what, measured.limits[0].0), (what, setting));
+        assert!(entry.places.len() <= 8 && entry.count >= entry.places.len() as u64, "{entry:?}");
+    }
 }
 
 #[test]

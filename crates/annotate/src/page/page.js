@@ -21,7 +21,7 @@ let queue = Promise.resolve();
 let finished = false;
 
 const frame = () => about.frames[at];
-const colour = (id) => STYLE.getPropertyValue(`--t${((id % 10) + 10) % 10}`);
+const colour = (id) => STYLE.getPropertyValue(`--t${((id % 20) + 20) % 20}`);
 const rowOf = (id) => people.get(id)?.get(frame());
 const here = () => [...people.keys()].filter((id) => rowOf(id)).sort((a, b) => a - b);
 

@@ -13,7 +13,10 @@ use tagalong_eval::{Match, Prepared, Role, Sequence};
 use tagalong_geometry::Rect;
 use toml::Table;
 
-use crate::remedies::Remedies;
+use crate::frame_notes::MeasuredValue;
+use crate::remedies::{Remedies, number, sections};
+
+use witness::{DroppedPlace, OF_SCORE};
 
 pub use depths::Depths;
 pub use witness::{SightedTrack, TrackStage, Witness};
@@ -70,9 +73,10 @@ pub struct Cause {
     pub name: String,
     /// Box of that candidate, pixels: left, top, width, height.
     pub box_px: Option<[f64; 4]>,
-    /// Cause in a sentence, without the tracks: the same for all people of one name.
+    /// Cause in a sentence, without the tracks and the candidate's value: the same for all people of one
+    /// name.
     pub why: String,
-    /// The whole sentence.
+    /// The whole sentence, with the value that was measured at this candidate.
     pub text: String,
 }
 
@@ -176,7 +180,7 @@ impl Witness {
                 return Cause::of_unconfirmed(id, rules);
             }
         }
-        let cause = self.dropped_or_measured(number, place, taken, rules);
+        let (cause, why) = self.dropped_or_measured(number, place, taken, rules);
         let lead = match (here, former) {
             (Some(track), _) => format!(
                 "Track {} is only predicted here, and a predicted track does not count as reported",
@@ -190,45 +194,69 @@ impl Witness {
             }
             (None, None) => "No track began here".to_owned(),
         };
-        let text = format!("{lead}: {}.", cause.why);
+        let text = format!("{lead}: {why}.");
         Cause { text, ..cause }
     }
 
-    /// Returns the test that dropped the best candidate, else what was measured at the place.
+    /// Returns the test that dropped the best candidate, else what was measured at the place; and the
+    /// sentence about this person alone.
     fn dropped_or_measured(
         &self,
         number: u64,
         place: &PersonAt,
         taken: &BTreeSet<i64>,
         rules: Rules<'_>,
-    ) -> Cause {
-        let Some((test, box_px)) = self.best_dropped(number, place, taken, rules) else {
+    ) -> (Cause, String) {
+        let Some((test, dropped)) = self.best_dropped(number, place, taken, rules) else {
             let depths = self.depths(number).zip(place.rect);
             let measured = depths.and_then(|(depths, rect)| depths.cause(&rect, rules));
             let (name, why) = measured.unwrap_or_else(|| {
                 ("no candidate", "no detector proposed a candidate here".to_owned())
             });
-            return Cause { name: name.to_owned(), why, ..Cause::default() };
+            return (Cause { name: name.to_owned(), why: why.clone(), ..Cause::default() }, why);
         };
-        Cause {
+        let why = rules.remedies.sentence(test, rules.config);
+        let own = self
+            .value_of(number, test, dropped, rules)
+            .map(|value| rules.remedies.sentence_measured(test, &value, rules.config));
+        let cause = Cause {
             test: Some(test.to_owned()),
             name: test.to_owned(),
-            box_px: Some(box_px),
-            why: rules.remedies.sentence(test, rules.config),
+            box_px: Some(dropped.box_px.map(|v| (f64::from(v) * 10.0).round() / 10.0)),
+            why: why.clone(),
             ..Cause::default()
+        };
+        (cause, own.unwrap_or(why))
+    }
+
+    /// Returns the value that a candidate was dropped for, with its limits.
+    fn value_of(
+        &self,
+        number: u64,
+        test: &str,
+        dropped: &DroppedPlace,
+        rules: Rules<'_>,
+    ) -> Option<MeasuredValue> {
+        let mut value = self.measured(number, dropped)?.clone();
+        if OF_SCORE.contains(&test) {
+            value.limits.extend(least_score(rules.config));
         }
+        let (_, limit) = value.limits.first()?;
+        // A verifier may judge after the manager did.
+        (!OF_SCORE.contains(&test) || value.value < *limit).then_some(value)
     }
 
     /// Returns the candidate that came nearest to a track: one of the person's size before one that
-    /// merely overlaps the person, then by the test that it failed, the last one first, then by the
-    /// distance. Second detections of other people are left out.
+    /// merely overlaps the person, then by the test that it failed, the last one first, then by how far
+    /// its value is beyond the limit, and by the distance. Second detections of other people are left
+    /// out.
     fn best_dropped(
         &self,
         number: u64,
         place: &PersonAt,
         taken: &BTreeSet<i64>,
         rules: Rules<'_>,
-    ) -> Option<(&str, [f64; 4])> {
+    ) -> Option<(&str, &DroppedPlace)> {
         let near = self.dropped(number).filter_map(|(test, dropped)| {
             let (nearness, distance) = dropped.nearness(place)?;
             if self.is_of_another(number, dropped, place, taken) {
@@ -236,11 +264,28 @@ impl Witness {
             }
             let is_telling = is_telling(test);
             let stage = rules.remedies.stage(test, rules.config);
-            Some(((is_telling, nearness, stage), distance, test, dropped.box_px))
+            let value = self.value_of(number, test, dropped, rules);
+            let beyond = value.map_or(f64::INFINITY, |value| beyond(&value));
+            Some(((is_telling, nearness, stage), beyond, distance, (test, dropped)))
         });
-        let best = near.max_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)))?;
-        Some((best.2, best.3.map(|v| (f64::from(v) * 10.0).round() / 10.0)))
+        let best =
+            near.max_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)).then(b.2.total_cmp(&a.2)));
+        best.map(|(.., found)| found)
     }
+}
+
+/// Returns how far a value is beyond its limit.
+fn beyond(value: &MeasuredValue) -> f64 {
+    value.limits.first().map_or(f64::INFINITY, |(_, limit)| (value.value - limit).abs())
+}
+
+/// Returns the least score of a candidate that starts a track, with the name of its setting.
+fn least_score(config: &Table) -> Option<(String, f64)> {
+    let manager = sections(config).find(|section| section.name == "manager")?;
+    ["start_log_odds", "start_score"].into_iter().find_map(|key| {
+        let limit = manager.setting(key).and_then(number)?;
+        Some((key.to_owned(), limit))
+    })
 }
 
 impl Cause {

@@ -5,7 +5,7 @@ use tagalong_eval::{Clear, Comparison, Frame, Region, Report, Similarity, Truth}
 use tagalong_geometry::{Camera, Pinhole};
 
 use super::*;
-use crate::frame_notes::{CandidateNote, DroppedNote, FateNote, FrameNotes};
+use crate::frame_notes::{CandidateNote, DroppedNote, FateNote, FrameNotes, MeasuredNote};
 
 /// Box of the person, and a candidate's box at it.
 const PERSON: Rect = Rect::new(100.0, 100.0, 60.0, 60.0);
@@ -29,7 +29,7 @@ fn candidate(test: &str, box_px: [f64; 4]) -> CandidateNote {
 }
 
 fn dropped(test: &str, box_px: [f64; 4]) -> DroppedNote {
-    DroppedNote { test: test.into(), count: 1, boxes_px: vec![box_px] }
+    DroppedNote { test: test.into(), count: 1, boxes_px: vec![box_px], ..DroppedNote::default() }
 }
 
 fn track(id: u32, stage: TrackStage, x: f32) -> SightedTrack {
@@ -71,6 +71,58 @@ fn the_last_test_of_a_candidate_of_the_persons_size_is_the_cause() {
         "No track began here: the test \"template cost\" dropped the candidate; decided by \
          detectors.0.config.discover_cost = 0.2 (depth-template): larger finds \
          more people and more furniture."
+    );
+}
+
+/// Returns a place near the person, and the cost that it was dropped for.
+fn costly(cost: f64, x: f64) -> ([f64; 4], MeasuredValue) {
+    let limits = vec![("refine_cost".to_owned(), 0.4), ("discover_cost".to_owned(), 0.2)];
+    ([x, 101.0, 58.0, 58.0], MeasuredValue { what: "cost".into(), value: cost, limits })
+}
+
+#[test]
+fn the_candidate_that_came_nearest_to_the_limit_is_told_with_its_value() {
+    let places = [costly(0.62, 102.0), costly(0.47, 110.0), costly(0.55, 101.0)];
+    let measured = places.iter().enumerate();
+    let measured = measured.map(|(at, (_, value))| MeasuredNote { at, value: value.clone() });
+    let note = DroppedNote {
+        test: "not refined".into(),
+        count: 9,
+        boxes_px: places.iter().map(|place| place.0).collect(),
+        measured: measured.collect(),
+    };
+    let found = cause(&FrameNotes { dropped: vec![note], ..FrameNotes::default() }, &[], None);
+    assert_eq!((found.name.as_str(), found.box_px), ("not refined", Some(places[1].0)));
+    assert!(
+        found.text.starts_with(
+            "No track began here: the test \"not refined\" dropped the candidate, cost 0.47 > \
+             refine_cost 0.4 and > discover_cost 0.2; it passes with "
+        ) && found.text.contains("discover_cost = 0.48 (depth-template): "),
+        "{}",
+        found.text
+    );
+    assert!(!found.why.contains("0.47"), "the same for all people: {}", found.why);
+}
+
+#[test]
+fn a_score_is_told_against_the_least_one_that_starts_a_track() {
+    let mut low = candidate("verifier", AT);
+    low.score = -1.304;
+    let notes = FrameNotes { candidates: vec![low], ..FrameNotes::default() };
+    assert!(!cause(&notes, &[], None).text.contains("log-odds"), "no limit is known");
+    let mut config = config();
+    let manager = config.get_mut("manager").and_then(|manager| manager.get_mut("config"));
+    let manager = manager.and_then(toml::Value::as_table_mut).expect("a manager");
+    manager.insert("start_log_odds".to_owned(), 0.0.into());
+    let mut witness = Witness::default();
+    witness.add(1, &notes, Vec::new(), None);
+    let place = PersonAt { rect: Some(PERSON), floor_m: None };
+    let rules = Rules { remedies: &remedies(), config: &config };
+    let told = witness.cause_at(1, &place, rules).text;
+    assert!(
+        told.contains("candidate, log-odds -1.30 < start_log_odds 0; it passes with [manager]")
+            && told.contains("{ start_log_odds = -1.31 }"),
+        "{told}"
     );
 }
 

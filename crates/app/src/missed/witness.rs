@@ -8,7 +8,7 @@ use tagalong_log::LogFrame;
 use tagalong_pipeline::FrameReport;
 
 use super::{Depths, PersonAt};
-use crate::frame_notes::{FateNote, FrameNotes};
+use crate::frame_notes::{FateNote, FrameNotes, MeasuredValue};
 
 /// Largest factor between the widths of a person's box and of a candidate for that person.
 const SIMILAR: f64 = 2.0;
@@ -24,6 +24,9 @@ const SAME_IOU: f64 = 0.5;
 
 /// Distance on the floor up to which a candidate or a track is near a person, m.
 const NEAR_M: f64 = 0.75;
+
+/// Tests of the score of a candidate, whose limit is in the config of the track manager.
+pub(super) const OF_SCORE: [&str; 2] = ["score", "verifier"];
 
 /// State of a track in one frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,12 +74,15 @@ pub(super) struct DroppedPlace {
     pub(super) box_px: [f32; 4],
     /// Place on the floor, odometry frame, m; not finite where it is not known.
     floor_m: [f32; 2],
+    /// Position of its value in [`Sight::measured`].
+    measured: Option<u16>,
 }
 
 /// One frame of a run.
 #[derive(Clone, Debug, Default)]
 struct Sight {
     places: Vec<DroppedPlace>,
+    measured: Vec<MeasuredValue>,
     tracks: Vec<SightedTrack>,
     /// Pose of the robot in the odometry frame.
     robot_odom: [f64; 3],
@@ -107,18 +113,36 @@ impl Witness {
         depths: Option<Depths>,
     ) {
         let mut places = Vec::new();
+        let mut measured = Vec::new();
         for candidate in &notes.candidates {
             if let FateNote::Dropped(test) = &candidate.fate {
                 let [x, y, _] = candidate.head_odom_m;
-                places.push(self.place(test, candidate.box_px, [x, y]));
+                let mut place = self.place(test, candidate.box_px, [x, y]);
+                if OF_SCORE.contains(&test.as_str()) {
+                    place.measured = u16::try_from(measured.len()).ok();
+                    let what = "log-odds".to_owned();
+                    measured.push(MeasuredValue {
+                        what,
+                        value: candidate.score,
+                        limits: Vec::new(),
+                    });
+                }
+                places.push(place);
             }
         }
         for dropped in &notes.dropped {
+            let first = places.len();
             for box_px in &dropped.boxes_px {
                 places.push(self.place(&dropped.test, *box_px, [f64::NAN; 2]));
             }
+            for note in &dropped.measured {
+                if let Some(place) = places.get_mut(first + note.at) {
+                    place.measured = u16::try_from(measured.len()).ok();
+                    measured.push(note.value.clone());
+                }
+            }
         }
-        let sight = Sight { places, tracks, robot_odom: notes.robot_odom, depths };
+        let sight = Sight { places, measured, tracks, robot_odom: notes.robot_odom, depths };
         self.frames.insert(number, sight);
     }
 
@@ -129,7 +153,9 @@ impl Witness {
             self.tests.len() - 1
         });
         let test = u16::try_from(at).unwrap_or(u16::MAX);
-        DroppedPlace { test, box_px: box_px.map(|v| v as f32), floor_m: floor_m.map(|v| v as f32) }
+        let box_px = box_px.map(|v| v as f32);
+        let floor_m = floor_m.map(|v| v as f32);
+        DroppedPlace { test, box_px, floor_m, measured: None }
     }
 
     /// Returns a place of the robot frame in the odometry frame, as of a frame.
@@ -155,6 +181,11 @@ impl Witness {
         places
             .iter()
             .filter_map(|place| Some((self.tests.get(usize::from(place.test))?.as_str(), place)))
+    }
+
+    /// Returns the value that a candidate was dropped for, if it is known.
+    pub(super) fn measured(&self, number: u64, dropped: &DroppedPlace) -> Option<&MeasuredValue> {
+        self.frames.get(&number)?.measured.get(usize::from(dropped.measured?))
     }
 
     /// Returns true for a candidate at a track of another person that is nearer to that track.

@@ -1,6 +1,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use crate::run::cannot_steer;
 use tagalong::logs::sources_of;
 use tagalong_app::config_file::{ConfigFile, OuterSettings};
 use tagalong_app::format::Format;
@@ -39,7 +40,7 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
         }
     }
     let suits = pipeline.config().suits;
-    let fit = log.map(|log| fits(pipeline, &outer, log)).transpose()?;
+    let fit = log.map(|log| fits(&file, pipeline, &outer, log)).transpose()?;
     let blind_zone = fit.as_ref().and_then(|fit| fit.blind_zone);
     let data_lost = fit.as_ref().is_some_and(|fit| fit.data_lost);
     let seen_m = fit.as_ref().and_then(|fit| fit.traits.camera_height_m);
@@ -165,12 +166,15 @@ fn told_zone(zone: &BlindZone) -> String {
 }
 
 /// Tries the first frames of the log.
-fn fits(mut pipeline: Pipeline, outer: &OuterSettings, log: &Path) -> Result<Fit, Failure> {
+fn fits(
+    file: &ConfigFile,
+    mut pipeline: Pipeline,
+    outer: &OuterSettings,
+    log: &Path,
+) -> Result<Fit, Failure> {
     check_log_path(log)?;
     let mut source = FrameSource::open(log, &outer.input, &outer.limits, pipeline.inputs())?;
-    pipeline
-        .check_sources(sources_of(&source))
-        .map_err(|why| Failure::failed(format!("`{}`: {why}", log.display())))?;
+    pipeline.check_sources(sources_of(&source)).map_err(|why| cannot_steer(file, log, &why))?;
     let mut tried = 0;
     let mut blind_zone = None;
     while tried < FRAMES

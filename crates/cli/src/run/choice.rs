@@ -49,8 +49,12 @@ pub(super) fn choose(
 /// Returns the line about the config that joins a network with depth. Only networks with figures on
 /// recorded logs are said to find more.
 fn joined_line(joined: &str, has_figures: bool) -> String {
-    let gain = if has_figures { "finds more people" } else { "joins your network with depth" };
-    format!("`tagalong run {joined} LOG` {gain}, and takes a call of the network per frame longer")
+    let gain = if has_figures {
+        "finds more people, and mixes up more of them in a crowd"
+    } else {
+        "joins your network with depth"
+    };
+    format!("`tagalong run {joined} LOG` {gain}; it takes a call of the network per frame longer")
 }
 
 #[cfg(test)]
@@ -62,7 +66,9 @@ mod tests {
         assert!(is_known_network("yolox-nano") && !is_known_network("own"));
         let known = joined_line("yolox-nano-depth", true);
         assert!(
-            known.starts_with("`tagalong run yolox-nano-depth LOG` finds more people"),
+            known.starts_with(
+                "`tagalong run yolox-nano-depth LOG` finds more people, and mixes up more"
+            ),
             "{known}"
         );
         let own = joined_line("own-depth", false);

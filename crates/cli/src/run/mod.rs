@@ -30,7 +30,7 @@ use tagalong_app::misfit::{COMPARE, Traits, misfit_note};
 use tagalong_app::origin::Origin;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, refused, say};
 use tagalong_app::progress::Progress;
-use tagalong_app::remedies::Remedies;
+use tagalong_app::remedies::{Remedies, reach_m};
 use tagalong_app::serialize::to_json;
 use tagalong_app::signals::Signals;
 use tagalong_app::suggest::check_log_path;
@@ -38,6 +38,7 @@ use tagalong_app::threads::threads;
 use tagalong_app::timings::Timings;
 use tagalong_app::unable::unable;
 use tagalong_config::Registry;
+use tagalong_core::Stamp;
 use tagalong_log::write::{FrameNames, FrameRecord, RunDir, RunTexts, TrackLog};
 use tagalong_log::{FrameSource, Input, Inputs, Usage};
 use tagalong_pipeline::{FrameReport, MissingSource, Pipeline, ResolvedConfig, StepError};
@@ -125,7 +126,7 @@ impl Job {
             None => choice::choose(args.log(), registry, &args.input)?,
         };
         let threads = args.threads.map(usize::from);
-        let (pipeline, settings) = config.pipeline_on(registry, args.seed, threads)?;
+        let (mut pipeline, settings) = config.pipeline_on(registry, args.seed, threads)?;
         let outer = args.input.applied(config.outer_for(&pipeline)?);
         let folder = args.output.clone().unwrap_or_else(|| default_folder(args, &config));
         RunDir::check(&folder, args.overwrite, args.log()).map_err(refused)?;
@@ -138,11 +139,13 @@ impl Job {
         }
         let source = FrameSource::open(args.log(), &outer.input, &outer.limits, inputs)
             .map_err(|error| refused_log(error, pipeline.config()))?;
-        // A config that the program chose is for the tracks alone; no robot follows its commands.
-        if is_named {
-            pipeline
-                .check_sources(sources_of(&source))
-                .map_err(|why| unsteered(args.log(), &why))?;
+        let unsteered = pipeline.check_sources(sources_of(&source)).err();
+        if let Some(why) = &unsteered {
+            if is_named {
+                return Err(cannot_steer(&config, args.log(), why));
+            }
+            // A config that the program chose is for the tracks alone.
+            pipeline = pipeline.without_controller().map_err(Failure::failed)?;
         }
         let resolved = outer.resolved_with(pipeline.config())?;
         let log = FileFacts { name: log_name(args), sha256: source.facts().sha256.clone() };
@@ -155,18 +158,27 @@ impl Job {
         let misfit = misfit_note(&config.name(), &[(log_name(args), misfits)]);
         report.notes.extend(misfit.map(|note| format!("{note}; {COMPARE}")));
         report.notes.extend(config.notes()?);
+        if unsteered.is_some() {
+            report.notes.push(WITHOUT_COMMANDS.into());
+        }
         let remedies = Remedies::new(registry);
         Ok(Self { pipeline, outer, source, resolved, folder, report, remedies })
     }
 }
 
-/// Returns the failure of a log that lacks a source of the controller, with the command that tracks the
-/// log all the same.
-fn unsteered(log: &Path, why: &MissingSource) -> Failure {
+/// Note on a log that lacks a source of the controller of the config that was chosen for it.
+const WITHOUT_COMMANDS: &str = "the log lacks what a controller needs (odometry, or a sensor of obstacles): its \
+                                people are tracked, and nobody is followed";
+
+/// Returns the failure of a log that lacks a source of the controller, with the command and the config that
+/// track the log all the same.
+pub(crate) fn cannot_steer(config: &ConfigFile, log: &Path, why: &MissingSource) -> Failure {
     let shown = log.display();
     let command = quoted(&shown.to_string());
     Failure::failed(format!(
-        "`{shown}`: {why}; `tagalong run {command}` tracks its people without commands to a robot"
+        "`{shown}`: {why}\n`tagalong run {command}` tracks its people without commands to a robot; so does a \
+         config of these two lines:\n  extends = \"{}\"\n  controller.plugin = \"none\"",
+        config.name()
     ))
 }
 
@@ -278,12 +290,18 @@ fn ms_since(start: Instant) -> f64 {
     start.elapsed().as_secs_f64() * 1e3
 }
 
+/// Name of the time from one frame of the log to the next.
+const PERIOD: &str = "period";
+
 /// Writers and counters of the results.
 struct Desk {
     log: TrackLog,
     overlay: Option<Overlay>,
     tally: Tally,
     timings: Timings,
+    /// Times from one frame of the log to the next.
+    periods: Timings,
+    last: Option<Stamp>,
     with_images: bool,
     is_odom_known: bool,
     remedies: Remedies,
@@ -296,6 +314,7 @@ impl Desk {
             None => None,
             Some(overlaid) => {
                 let style = overlaid.style(job.outer.output.boxes);
+                let style = style.reaching(reach_m(job.resolved.values()).unwrap_or_default());
                 Some(Overlay::new(dir.overlay().map_err(refused)?, style))
             }
         };
@@ -317,6 +336,8 @@ impl Desk {
             overlay,
             tally,
             timings,
+            periods: Timings::default(),
+            last: None,
             with_images: args.with_images,
             is_odom_known: !job.source.lacks_usable_odometry(),
             remedies,
@@ -331,6 +352,10 @@ impl Desk {
             return Ok(());
         }
         self.timings.add_frame(&report.timings);
+        let last = self.last.replace(report.stamp);
+        if let Some(last) = last {
+            self.periods.add(PERIOD, 1e3 * report.stamp.seconds_since(last));
+        }
         let writing = Instant::now();
         let record = FrameRecord {
             index: report.index,
@@ -390,7 +415,10 @@ impl Desk {
         match args.format {
             _ if args.quiet => {}
             Format::Json => print(&json)?,
-            Format::Text => print(&summary::text(&report, &self.timings, &folder, args))?,
+            Format::Text => {
+                let period_ms = self.periods.summary().get(PERIOD).map(|times| times.p50_ms);
+                print(&summary::text(&report, &self.timings, period_ms, &folder, args))?;
+            }
         }
         verdict(args, &report, stopped, signals, &self.remedies)
     }

@@ -2,7 +2,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use clap::ValueEnum;
-use tagalong_app::timings::{Timings, WHOLE_FRAME};
+use tagalong_app::timings::{Timings, WHOLE_FRAME, too_slow};
 use tagalong_log::Input;
 use tagalong_math::counted;
 
@@ -25,7 +25,13 @@ const STAGE_LINES: usize = 3;
 const NO_LOSS: [&str; 3] = ["chunks_verified", "frames", "messages"];
 
 /// Returns the results of a run, for a terminal.
-pub fn text(report: &RunReport, timings: &Timings, folder: &Path, args: &RunArgs) -> String {
+pub fn text(
+    report: &RunReport,
+    timings: &Timings,
+    period_ms: Option<f64>,
+    folder: &Path,
+    args: &RunArgs,
+) -> String {
     let mut out = String::new();
     let frames = &report.frames;
     let _ = writeln!(
@@ -40,7 +46,7 @@ pub fn text(report: &RunReport, timings: &Timings, folder: &Path, args: &RunArgs
     );
     persons(&mut out, report, args);
     funnel(&mut out, report);
-    times(&mut out, timings);
+    times(&mut out, timings, period_ms, args);
     losses(&mut out, report);
     let has_images = IMAGES.iter().any(|input| report.inputs.usable().contains(&input.name()));
     files(&mut out, folder, has_images, args.overlay.is_some());
@@ -120,7 +126,7 @@ fn funnel(out: &mut String, report: &RunReport) {
 }
 
 /// Writes the times of whole frames and of the stages whose worst frames were slowest.
-fn times(out: &mut String, timings: &Timings) {
+fn times(out: &mut String, timings: &Timings, period_ms: Option<f64>, args: &RunArgs) {
     let summary = timings.summary();
     let Some(whole) = summary.get(WHOLE_FRAME) else { return };
     let mut stages: Vec<_> = summary.iter().filter(|(name, _)| **name != WHOLE_FRAME).collect();
@@ -130,6 +136,14 @@ fn times(out: &mut String, timings: &Timings) {
     for (name, t) in std::iter::once((&WHOLE_FRAME, whole)).chain(stages).take(1 + STAGE_LINES) {
         let [p50, p95, p99] = [t.p50_ms, t.p95_ms, t.p99_ms];
         let _ = writeln!(out, "  {name:<12}{p50:>8.2}{p95:>8.2}{p99:>8.2}{:>8.2}", t.max_ms);
+    }
+    if let Some(slow) = period_ms.and_then(|period_ms| too_slow(whole.mean_ms, period_ms)) {
+        let log = quoted(&args.log().display().to_string());
+        let _ = writeln!(
+            out,
+            "  {slow};\n  `tagalong doctor {log}` prints the time of each pipeline; a network may run in every \
+             Nth frame (`every = N` beside its `plugin`)"
+        );
     }
 }
 

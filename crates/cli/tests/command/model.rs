@@ -210,6 +210,8 @@ fn a_network_joined_with_depth_finds_people_close_by() {
     let log = log.to_str().unwrap();
     let chosen = text(&run_at(home, &["run", log, "-o", "by-itself"]).stderr);
     assert!(chosen.contains("tagalong run yolox-nano-depth LOG"), "{chosen}");
+    let noted = printed_at(home, &["check", "yolox-nano-depth"]);
+    assert!(!noted.contains("replace"), "nobody edited the config: {noted}");
     let [alone, joined] = ["depth-verified", "yolox-nano-depth"].map(|config| -> f64 {
         printed_at(home, &["run", config, log, "-o", config]);
         let scored = printed_at(home, &["eval", "--truth", truth, "--tracks", config]);

@@ -13,6 +13,11 @@ impl Evidence {
         let images = facts.colour_topic.as_ref().or(facts.depth_topic.as_ref());
         self.inspection.topic(images.or(facts.laser_topic.as_ref())?)
     }
+
+    /// Returns the median time from one frame to the next, ms.
+    pub fn period_ms(&self) -> Option<f64> {
+        Some(1e3 * self.primary()?.timing?.median_period_s)
+    }
 }
 
 /// Checks the rate of the images, or of the scans where they make the frames.

@@ -51,7 +51,13 @@ impl Mount {
 
     pub(super) fn assumed() -> Self {
         let mount = MountSettings { height_m: ASSUMED_HEIGHT_M, ..MountSettings::default() };
-        Self::fixed(&mount, "an assumption (neither tf, nor [input.camera], nor depth)".into())
+        let MountSettings { height_m, pitch_down_deg, .. } = mount;
+        let source = format!(
+            "an assumption (neither tf, nor [input.camera], nor depth): {height_m:?} m high, level; measure \
+             it, and write `input.camera = {{ height_m = {height_m:?}, pitch_down_deg = {pitch_down_deg:?} }}` \
+             into the config"
+        );
+        Self::fixed(&mount, source)
     }
 
     /// Returns the mount of a laser scanner that is not in tf.

@@ -15,6 +15,10 @@ pub(super) fn resolve(
     root.remove(super::tune::TABLE);
     root.remove(super::suits::TABLE);
     root.extend(table_of(settings)?);
+    let controller = root.get("controller").and_then(|section| section.get("plugin"));
+    if controller.and_then(Value::as_str) == Some(super::NO_CONTROLLER) {
+        root.remove("controller");
+    }
     for (section, kind) in [("associator", Kind::Associator), ("manager", Kind::Manager)] {
         let named = match registry.default_of(kind) {
             Some(plugin) => Table::from_iter([("plugin".to_owned(), Value::from(plugin.name))]),

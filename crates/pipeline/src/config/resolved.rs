@@ -70,6 +70,13 @@ impl ResolvedConfig {
         Ok(Self { values, text: format!("{own}\n{theirs}"), ..self.clone() })
     }
 
+    /// Leaves a section of the values out.
+    pub(crate) fn remove(&mut self, section: &str) -> Result<(), ConfigError> {
+        self.values.remove(section);
+        self.text = to_text(&self.values)?;
+        Ok(())
+    }
+
     /// Returns the text of the config with other values for some settings, by their dotted keys.
     ///
     /// # Errors

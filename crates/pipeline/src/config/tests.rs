@@ -395,6 +395,17 @@ fn a_source_without_the_data_of_a_controller_is_refused_unless_the_config_says_s
     assert_eq!(check("", drive, odometry), Err(MissingSource::Odometry));
     assert_eq!(check("robot.odometry = 'none'", drive, odometry), Ok(()));
     assert_eq!(check("", "", Sources::default()), Ok(()), "without a controller");
+    let none = "controller.plugin = 'none'\n";
+    let left_out = format!("{none}controller.config = {{ keeps = 1 }}");
+    assert_eq!(check(&left_out, "", Sources::default()), Ok(()), "an inherited one is left out");
+    let pipeline = build(&format!("{none}{PLAIN}")).expect("a pipeline without a controller");
+    assert!(!pipeline.has_controller());
+    assert_eq!(pipeline.config().values().get("controller"), None);
+    let driving = build(&format!("{PLAIN}{drive}")).expect("a pipeline with one");
+    let tracking = driving.without_controller().expect("its config as text");
+    assert_eq!(tracking.check_sources(Sources::default()), Ok(()));
+    assert_eq!(tracking.config().values().get("controller"), None);
+    assert!(!tracking.config().to_toml().contains("[controller]"));
     for missing in [MissingSource::Obstacles, MissingSource::Odometry] {
         assert!(missing.to_string().contains("= \"none\"` in ["), "{missing}");
     }

@@ -27,7 +27,7 @@ pub fn series_class(index: usize) -> String {
 }
 
 /// Colours of tracks, which are others than those of pipelines.
-const TRACK_COLOURS: i64 = 10;
+const TRACK_COLOURS: i64 = 20;
 
 /// Returns the class that colours a track, as pictures and pages of runs colour it.
 pub fn track_class(id: i64) -> String {

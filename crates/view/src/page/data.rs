@@ -199,6 +199,9 @@ pub struct DroppedData {
     /// Their regions, as far as they are known and no candidate has them, pixels.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub boxes: Vec<[f64; 4]>,
+    /// Values that some of these were dropped for, in words, by the position of the box.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub values: BTreeMap<usize, String>,
 }
 
 /// Test of the funnel with what decides it.

@@ -109,12 +109,16 @@ fn dropped_data(notes: &FrameNotes) -> Vec<DroppedData> {
         .dropped
         .iter()
         .map(|dropped| {
-            let is_known = of_candidates.contains(dropped.test.as_str());
-            DroppedData {
+            let mut data = DroppedData {
                 test: dropped.test.clone(),
                 n: dropped.count,
-                boxes: if is_known { Vec::new() } else { dropped.boxes_px.clone() },
+                ..DroppedData::default()
+            };
+            if !of_candidates.contains(dropped.test.as_str()) {
+                data.boxes.clone_from(&dropped.boxes_px);
+                data.values = dropped.measured.iter().map(|m| (m.at, m.value.in_words())).collect();
             }
+            data
         })
         .collect()
 }
@@ -191,7 +195,7 @@ pub fn add_trails(
 #[cfg(test)]
 mod tests_of_data {
     use nalgebra::Vector2;
-    use tagalong_app::frame_notes::DroppedNote;
+    use tagalong_app::frame_notes::{DroppedNote, MeasuredNote, MeasuredValue};
     use tagalong_config::{Registry, Remedy};
     use tagalong_geometry::{Distortion, Pinhole};
 
@@ -244,15 +248,23 @@ mod tests_of_data {
     #[test]
     fn places_of_candidates_are_not_shown_twice() {
         fn note(test: &str) -> DroppedNote {
-            DroppedNote { test: test.into(), count: 1, boxes_px: vec![[1.0, 2.0, 3.0, 4.0]] }
+            let limits = vec![("most".to_owned(), 0.4)];
+            let value = MeasuredValue { what: "cost".into(), value: 0.5, limits };
+            DroppedNote {
+                test: test.into(),
+                count: 1,
+                boxes_px: vec![[1.0, 2.0, 3.0, 4.0]],
+                measured: vec![MeasuredNote { at: 0, value }],
+            }
         }
 
         let mut notes = FrameNotes::default();
         let fate = FateNote::Dropped("verifier".into());
         notes.candidates = vec![CandidateNote { fate, ..CandidateNote::default() }];
         notes.dropped = vec![note("verifier"), note("head width")];
-        let boxes: Vec<usize> = dropped_data(&notes).iter().map(|d| d.boxes.len()).collect();
-        assert_eq!(boxes, [0, 1]);
+        let [verifier, width] = &dropped_data(&notes)[..] else { panic!("{notes:?}") };
+        assert!(verifier.boxes.is_empty() && verifier.values.is_empty());
+        assert_eq!((width.boxes.len(), width.values[&0].as_str()), (1, "cost 0.50 > most 0.4"));
     }
 
     #[test]

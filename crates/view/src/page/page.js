@@ -2,7 +2,7 @@
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
   const SVG = "http://www.w3.org/2000/svg";
-  const COLOURS = 10;
+  const COLOURS = 20;
   let [WIDTH, HEIGHT] = data.image_px;
   let last = data.t.length - 1;
   const id = (name) => document.getElementById(name);
@@ -139,6 +139,13 @@
     return outline(person.box, kind, k, missed ? 2.5 : 1, `annotated person ${person.id}${missed ? ", missed" : ""}`);
   });
 
+  // An annotated person in question keeps the marks of the legend, in wider lines.
+  const askedMark = (run, { box, person }, k) => {
+    if (person === undefined) return outline(box, "asked", k, 2, "the place in question");
+    const kind = isMissed(run, state.at, person) ? "truth miss" : "truth";
+    return outline(box, kind, k, 4, `annotated person ${person}, in question`);
+  };
+
   const drawImage = (run, number) => {
     const target = id(`image-${number}`);
     if (!WIDTH) return;
@@ -160,7 +167,7 @@
       }
     }
     // Below the labels, so that it hides none.
-    if (state.question && state.question.box) parts.push(outline(state.question.box, "asked", k, 2, "the place in question"));
+    if (state.question && state.question.box) parts.push(askedMark(run, state.question, k));
     if (frame) {
       const taken = [];
       for (const track of frame.tracks) {
@@ -594,10 +601,29 @@
     : Math.hypot(thing.at[0] - question.at[0], thing.at[1] - question.at[1]) <= NEAR_M);
   const hasPlace = (person) => Boolean(person.box || person.at);
 
-  const droppedNear = (frame, question) => [
-    ...frame.found.filter((c) => c.test && isAt(c, question)).map((c) => ({ test: c.test, text: `${c.by}, log-odds ${fixed(c.score, 1)}` })),
-    ...frame.dropped.flatMap((test) => (test.boxes || []).filter((box) => question.box && isNear(box, question)).map(() => ({ test: test.test, text: "a place that did not become a candidate" }))),
-  ];
+  // Near for a candidate, by the rule that finds the cause: its centre is in the box, or both have a tenth
+  // of the smaller one in common.
+  const LEAST_SHARE = 0.1;
+  const touches = ([x, y, w, h], { box: [qx, qy, qw, qh] }) => {
+    const [cx, cy] = [x + w / 2, y + h / 2];
+    if (qx <= cx && cx <= qx + qw && qy <= cy && cy <= qy + qh) return true;
+    const across = Math.min(x + w, qx + qw) - Math.max(x, qx);
+    const down = Math.min(y + h, qy + qh) - Math.max(y, qy);
+    return across > 0 && down > 0 && across * down >= LEAST_SHARE * Math.min(w * h, qw * qh);
+  };
+  const isDroppedAt = (thing, question) => (question.box ? touches(thing.box, question) : isAt(thing, question));
+
+  // The candidates that were dropped at a place, those of the last stage first.
+  const droppedNear = (run, frame, question) => {
+    const found = frame.found.filter((c) => c.test && isDroppedAt(c, question))
+      .map((c) => ({ test: c.test, text: `${c.by}, log-odds ${fixed(c.score, 1)}` }));
+    for (const test of frame.dropped) (test.boxes || []).forEach((box, at) => {
+      const text = (test.values || {})[at] || "a place that did not become a candidate";
+      if (question.box && touches(box, question)) found.push({ test: test.test, text });
+    });
+    const stage = (item) => (run.tests[item.test] ? run.tests[item.test].stage : 0);
+    return found.sort((a, b) => stage(b) - stage(a));
+  };
 
   const grouped = (items) => {
     const groups = new Map();
@@ -605,20 +631,18 @@
     return [...groups];
   };
 
+  const told = (texts) => {
+    const different = [...new Set(texts)];
+    return texts.length > 1 ? `${texts.length}: ${different.join("; ")}` : texts[0];
+  };
+
   const aroundCounts = (run, question) => {
     const counts = new Map();
     for (let i = Math.max(0, state.at - AROUND); i <= Math.min(last, state.at + AROUND); i += 1) {
       if (!run.frames[i]) continue;
-      for (const test of new Set(droppedNear(run.frames[i], question).map((item) => item.test))) counts.set(test, (counts.get(test) || 0) + 1);
+      for (const test of new Set(droppedNear(run, run.frames[i], question).map((item) => item.test))) counts.set(test, (counts.get(test) || 0) + 1);
     }
     return [...counts].sort((a, b) => b[1] - a[1]);
-  };
-
-  // The test of the last stage that dropped something here.
-  const lastTest = (run, frame, question) => {
-    const tests = droppedNear(frame, question).map((item) => item.test);
-    const stage = (test) => (run.tests[test] ? run.tests[test].stage : 0);
-    return tests.sort((a, b) => stage(b) - stage(a))[0];
   };
 
   // Of an annotated person who is missed the data has the cause; of any other place the page tells what
@@ -630,8 +654,8 @@
     if (hit) return `Annotated person ${question.person} is found as track ${hit}.`;
     const here = frame.tracks.filter((track) => isAt(track, question));
     const tracks = here.map((track) => `track ${track.id}, ${stateOf(track)}`).join("; ") || "no track";
-    const test = lastTest(run, frame, question);
-    const why = run.tests[test] ? run.tests[test].why : "no recorded candidate was dropped";
+    const [last] = droppedNear(run, frame, question);
+    const why = last && run.tests[last.test] ? `${run.tests[last.test].why} (${last.text})` : "no recorded candidate was dropped";
     return `At this place: ${tracks}; ${why}.`;
   };
 
@@ -646,9 +670,9 @@
     const frame = frameOf(run, state.at);
     if (!state.question || !frame) return place.replaceChildren();
     const isOpen = Boolean(place.querySelector("details[open]"));
-    const groups = grouped(droppedNear(frame, state.question));
+    const groups = grouped(droppedNear(run, frame, state.question));
     const row = ([test, texts]) => el("tr", {},
-      el("th", { scope: "row" }, test), el("td", {}, texts.length > 1 ? `${texts.length}: ${texts[0]}` : texts[0]), settings(run, test));
+      el("th", { scope: "row" }, test), el("td", {}, told(texts)), settings(run, test));
     const rest = [groups.length
       ? table(`Tests of ${run.name} that dropped candidates here`, ["Dropped by", "What", "Decided by"], groups.map(row))
       : el("p", {}, "No recorded candidate was dropped near this place in this frame.")];
@@ -661,10 +685,10 @@
 
   const ask = (question) => {
     state.question = question;
-    id("question").textContent = question ? question.text : INVITATION;
+    id("question").textContent = question ? question.text : invitation();
     draw();
   };
-  const INVITATION = !WIDTH && data.truth ? "Choose a missed person, or an event \"missed\"." : id("question").textContent;
+  const invitation = () => `Click on the ${WIDTH ? "image or the plan" : "plan"} where a person was missed${data.truth ? ", or choose an event \"missed\"" : ""}.`;
   const HALF_PX = 0.04;
 
   const askAt = (event) => {
@@ -676,6 +700,28 @@
     pause();
     ask({ box: [point.x - half, point.y - half, 2 * half, 2 * half], text: `At column ${Math.round(point.x)}, row ${Math.round(point.y)}:` });
     return undefined;
+  };
+
+  // The same for a place of the plan of a run.
+  const askAtPlan = (event, number) => {
+    const target = event.currentTarget;
+    const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(target.getScreenCTM().inverse());
+    const at = [point.x, -point.y];
+    const far = (person) => Math.hypot(person.at[0] - at[0], person.at[1] - at[1]);
+    const missed = truthAt(state.at).filter((person) => person.at && far(person) <= NEAR_M
+      && data.runs.some((run) => isMissed(run, state.at, person.id))).sort((a, b) => far(a) - far(b));
+    if (missed.length) return askPerson(missed[0]);
+    pause();
+    ask({ at, text: placeText(frameOf(data.runs[number], state.at), at) });
+    return undefined;
+  };
+
+  const placeText = (frame, at) => {
+    if (!frame) return "At this place:";
+    const [dx, dy] = [at[0] - frame.robot[0], at[1] - frame.robot[1]];
+    const [sin, cos] = [Math.sin(frame.robot[2]), Math.cos(frame.robot[2])];
+    const [ahead, left] = [cos * dx + sin * dy, cos * dy - sin * dx];
+    return `At ${fixed(Math.abs(ahead), 1)} m ${ahead < 0 ? "behind" : "ahead"}, ${fixed(Math.abs(left), 1)} m to the ${left < 0 ? "right" : "left"} of the robot:`;
   };
 
   // The missed person at a point of the image: of several the one with the smallest box, which is behind the others.
@@ -725,9 +771,17 @@
   const hiddenKinds = new Set();
   const knownKinds = new Set();
 
+  // The list of events is below: the picture of the frame must be in sight, and the reason beneath it.
+  const bringIntoView = () => {
+    const stage = document.querySelector(".runs");
+    const { top } = stage.getBoundingClientRect();
+    if (top < 0 || top > innerHeight / 2) stage.scrollIntoView({ block: "start" });
+  };
+
   const goToEvent = (event) => {
     pause();
     show(event.i);
+    bringIntoView();
     const person = truthAt(event.i).find((other) => other.id === event.person && hasPlace(other));
     if (event.kind === "missed" && person) askPerson(person);
   };
@@ -884,7 +938,7 @@
     image.setAttribute("viewBox", `0 0 ${WIDTH || 4} ${HEIGHT || 3}`);
     id(`picture-${number}`).hidden = !WIDTH;
     image.closest(".views").classList.toggle("alone", !WIDTH);
-    id("why").hidden = !WIDTH && !data.truth;
+    if (!state.question) id("question").textContent = invitation();
   };
 
   const prepare = () => {
@@ -901,6 +955,7 @@
     id("drive").hidden = !data.live && !data.runs.some((run) => run.frames.some((frame) => frame && frame.drive));
     data.runs.forEach((run, number) => {
       id(`image-${number}`).addEventListener("click", askAt);
+      id(`plan-${number}`).addEventListener("click", (event) => askAtPlan(event, number));
       fitImage(number);
       drawStrip(run, number);
       id(`strip-${number}`).addEventListener("click", jump);

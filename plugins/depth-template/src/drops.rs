@@ -1,0 +1,133 @@
+//! What one scan drops: counts of all places, and some of them with what was measured there.
+
+use tagalong_core::{Funnel, Measured};
+
+use crate::candidates::tests_named;
+use crate::view::MetricImage;
+
+/// Places of one test that are kept of a scan.
+const MOST_PLACES: usize = 8;
+
+/// Least distance between two of them, m: a head wide.
+const APART_M: f64 = 0.2;
+
+/// Tests that most places of an image fail.
+const COMMON: [&str; 3] = [tests_named::VOLUME, tests_named::BOUNDARY, tests_named::WINDOW];
+
+/// Test that a place failed.
+#[derive(Clone, Copy, Debug)]
+pub struct Failed {
+    /// Name of the test.
+    pub test: &'static str,
+    /// Value against a setting, where the test is one of a single value.
+    pub against: Option<Against>,
+}
+
+/// Value against a setting.
+#[derive(Clone, Copy, Debug)]
+pub struct Against {
+    /// Name of the value.
+    pub what: &'static str,
+    /// The value.
+    pub value: f64,
+    /// Name and value of the setting.
+    pub setting: (&'static str, f64),
+}
+
+/// Place in the reduced image that a test dropped.
+#[derive(Clone, Debug)]
+pub struct Place {
+    /// Reduced pixel.
+    pub x: i64,
+    /// Its row.
+    pub y: i64,
+    /// Depth of the face, m.
+    pub depth_m: f64,
+    /// What was measured there.
+    pub measured: Option<Measured>,
+}
+
+/// Places that one test dropped.
+#[derive(Debug)]
+struct Dropped {
+    test: &'static str,
+    count: u64,
+    /// True for a test that most of an image fails: its last place alone is kept.
+    is_common: bool,
+    places: Vec<Place>,
+}
+
+/// Places dropped by the tests of one scan; their regions are worked out at the end.
+#[derive(Debug, Default)]
+pub struct Drops {
+    entries: Vec<Dropped>,
+}
+
+impl Failed {
+    /// Returns a test that is not one of a single value.
+    pub const fn at(test: &'static str) -> Self {
+        Self { test, against: None }
+    }
+}
+
+impl Against {
+    /// Returns the value with the setting that it breaks.
+    pub fn measured(&self) -> Measured {
+        Measured { what: self.what, value: self.value, limits: vec![self.setting] }
+    }
+}
+
+impl Place {
+    fn new(x: i64, y: i64, depth_m: f64) -> Self {
+        Self { x, y, depth_m, measured: None }
+    }
+}
+
+impl Drops {
+    /// Counts a place that failed a test. Common tests keep the last one, the others several that are
+    /// apart.
+    pub fn add(&mut self, failed: Failed, view: &MetricImage, (x, y): (i64, i64), depth_m: f64) {
+        let Failed { test, against } = failed;
+        let at = self.entries.iter().position(|entry| entry.test == test).unwrap_or_else(|| {
+            let is_common = COMMON.contains(&test);
+            self.entries.push(Dropped { test, count: 0, is_common, places: Vec::new() });
+            self.entries.len() - 1
+        });
+        let entry = &mut self.entries[at];
+        entry.count += 1;
+        if entry.is_common {
+            entry.places.clear();
+        } else {
+            let apart = APART_M * view.px_per_m(depth_m);
+            let is_apart = entry.places.iter().all(|kept| {
+                let aside = (kept.x - x).abs().max((kept.y - y).abs());
+                aside as f64 >= apart
+            });
+            if !is_apart || entry.places.len() == MOST_PLACES {
+                return;
+            }
+        }
+        let measured = against.map(|against| against.measured());
+        entry.places.push(Place { measured, ..Place::new(x, y, depth_m) });
+    }
+
+    /// Returns the kept places of a test.
+    pub fn places_of(&mut self, test: &str) -> &mut [Place] {
+        let entry = self.entries.iter_mut().find(|entry| entry.test == test);
+        entry.map_or(&mut [], |entry| &mut entry.places)
+    }
+
+    /// Counts everything in the funnel.
+    pub fn report(self, view: &MetricImage, funnel: &mut Funnel) {
+        for Dropped { test, count, places, .. } in self.entries {
+            funnel.drop_many(test, count - places.len() as u64);
+            for Place { x, y, depth_m, measured } in places {
+                let region = view.region(x as f64, y as f64, depth_m);
+                match measured {
+                    Some(measured) => funnel.drop_measured(test, region, measured),
+                    None => funnel.drop_at(test, region),
+                }
+            }
+        }
+    }
+}
