@@ -116,7 +116,9 @@ impl Config {
 }
 
 impl Steering for Config {
-    fn steer(&self, now: &Situation<'_>) -> Twist {
+    type Memory = ();
+
+    fn steer(&self, now: &Situation<'_>, (): &mut ()) -> Twist {
         let max_rps = self.max_turn_rate.min(now.max_rps);
         let horizon_s = STEP_S * STEPS as f64;
         let stand_off_m = self.stand_off_m();

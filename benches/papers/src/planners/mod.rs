@@ -9,6 +9,7 @@ mod avoidable;
 mod dynamic_window;
 mod obstacles;
 mod planner;
+mod regularised_dual;
 mod rides;
 mod social_force;
 mod table;
@@ -20,7 +21,7 @@ use crate::findings::{Experiment, System};
 /// The benchmark: our controllers beside its planners, on the same seeds.
 pub const SYSTEM: System = System {
     name: "follow-bench",
-    about: "following among people: our controllers beside two planners of Follow-Bench",
+    about: "following among people: our controllers beside three planners of Follow-Bench",
     experiments: &[
         Experiment {
             name: "told",
@@ -55,6 +56,7 @@ pub const SYSTEM: System = System {
 /// Registers the planners.
 pub(crate) fn register(registry: &mut Registry) {
     dynamic_window::register(registry);
+    regularised_dual::register(registry);
     social_force::register(registry);
 }
 

@@ -4,14 +4,17 @@ use tagalong_controllers::step_s;
 use tagalong_core::{Controller, EgoMotion, Input, Inputs, Result, Scene, Twist};
 
 /// Above this no length or speed on the floor makes sense, whatever the unit.
-const MOST: f64 = 1e6;
+pub(super) const MOST: f64 = 1e6;
 /// Distance at which a lost person is approached, m.
 const SEARCH_M: f64 = 0.2;
 
 /// The equations of a planner, by its settings.
 pub(super) trait Steering: Settings + Send {
+    /// State from one frame to the next, forgotten with the person.
+    type Memory: Default + Send;
+
     /// Returns the command for one frame, within the limits.
-    fn steer(&self, now: &Situation<'_>) -> Twist;
+    fn steer(&self, now: &Situation<'_>, memory: &mut Self::Memory) -> Twist;
 
     /// Returns the distance kept from the centre of the person, m.
     fn stand_off_m(&self) -> f64;
@@ -33,10 +36,11 @@ pub(super) struct Situation<'a> {
 }
 
 /// A planner as a controller, with the followed person and the last command.
-pub(super) struct Planner<S> {
+pub(super) struct Planner<S: Steering> {
     settings: S,
     quarry: Option<Quarry>,
     last: Twist,
+    memory: S::Memory,
 }
 
 impl<S: Steering> Planner<S> {
@@ -46,11 +50,11 @@ impl<S: Steering> Planner<S> {
     /// Settings outside their ranges.
     pub(super) fn new(settings: S) -> Result<Self> {
         check_settings(&settings)?;
-        Ok(Self { settings, quarry: None, last: Twist::STOP })
+        Ok(Self { settings, quarry: None, last: Twist::STOP, memory: S::Memory::default() })
     }
 
     /// Returns the command for the followed person; `None` without a person or a usable drive.
-    fn steer(&self, scene: &Scene<'_>) -> Option<Twist> {
+    fn steer(&mut self, scene: &Scene<'_>) -> Option<Twist> {
         let quarry = self.quarry?;
         let max_mps = scene.max_speed_mps;
         let half_m = scene.wheels.half_separation_m;
@@ -60,7 +64,7 @@ impl<S: Steering> Planner<S> {
         let max_rps = max_mps / half_m;
         let dt_s = step_s(&scene.frame.motion);
         let now = Situation { scene, quarry, last: self.last, max_mps, max_rps, dt_s };
-        Some(self.settings.steer(&now))
+        Some(self.settings.steer(&now, &mut self.memory))
     }
 }
 
@@ -71,7 +75,11 @@ impl<S: Steering> Controller for Planner<S> {
 
     fn command(&mut self, scene: &Scene<'_>) -> Twist {
         self.quarry = Quarry::next(self.quarry, scene);
-        self.last = self.steer(scene).unwrap_or(Twist::STOP);
+        let steered = self.steer(scene);
+        if steered.is_none() {
+            self.memory = S::Memory::default();
+        }
+        self.last = steered.unwrap_or(Twist::STOP);
         self.last
     }
 
@@ -119,11 +127,22 @@ impl Quarry {
     /// robot of now, `distance_m` before the person. A lost person is expected where they would be at
     /// the end of the horizon, and approached.
     pub(super) fn goal(&self, seconds: f64, horizon_s: f64, distance_m: f64) -> Point2<f64> {
-        let (ahead_s, distance_m) =
-            if self.is_seen { (seconds, distance_m) } else { (horizon_s, SEARCH_M) };
-        let place = self.place + self.velocity * ahead_s;
-        let towards = place.coords.try_normalize(1e-6).unwrap_or_else(Vector2::x);
+        let distance_m = if self.is_seen { distance_m } else { SEARCH_M };
+        let (place, towards) = self.expected(seconds, horizon_s);
         place - towards * distance_m
+    }
+
+    /// Returns the direction to the person at the time of [`Self::goal`], rad.
+    pub(super) fn bearing(&self, seconds: f64, horizon_s: f64) -> f64 {
+        let (_, towards) = self.expected(seconds, horizon_s);
+        towards.y.atan2(towards.x)
+    }
+
+    /// Returns where the person is expected, and the direction to there.
+    fn expected(&self, seconds: f64, horizon_s: f64) -> (Point2<f64>, Vector2<f64>) {
+        let ahead_s = if self.is_seen { seconds } else { horizon_s };
+        let place = self.place + self.velocity * ahead_s;
+        (place, place.coords.try_normalize(1e-6).unwrap_or_else(Vector2::x))
     }
 }
 

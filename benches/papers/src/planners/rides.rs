@@ -9,11 +9,12 @@ use crate::lab::{Lab, ReproduceError};
 /// Settings of the benchmark.
 pub(super) const SETTINGS: [&str; 5] = ["circular", "corridor", "crossing", "doorway", "clutter"];
 /// Names of the controllers in the tables, and their configs.
-pub(super) const PLANNERS: [(&str, &str); 4] = [
+pub(super) const PLANNERS: [(&str, &str); 5] = [
     ("clear-follow", "follow-bench-robot"),
     ("foresee-follow", "follow-bench-foresee"),
     ("their DWA", "follow-bench-dwa"),
     ("their SFM", "follow-bench-sfm"),
+    ("their RDA", "follow-bench-rda"),
 ];
 /// Seeds of each setting.
 const SEEDS: u64 = 20;

@@ -7,7 +7,7 @@ use nalgebra::{Point2, Vector2};
 use tagalong_config::Registry;
 use tagalong_core::{Twist, settings};
 
-use super::obstacles::{centres, others, readings};
+use super::obstacles::{Clusters, others, readings};
 use super::planner::{Planner, Situation, Steering};
 
 /// Time ahead at which a lost person is expected, s.
@@ -18,6 +18,8 @@ const GAIN: f64 = 1.3;
 /// Strength, m/s², and decay, m, of the forces of things and of people.
 const THINGS: [f64; 2] = [10.0, 0.5];
 const PEOPLE: [f64; 2] = [7.0, 0.5];
+/// Which readings of the laser are a thing.
+const CLUSTERS: Clusters = Clusters { neighbour_m: 0.5, least: 3 };
 /// Distance of things that have no force any more, m, and the distance that is safe, m.
 const REACH_M: f64 = 5.0;
 const SAFE_M: f64 = 0.3;
@@ -41,9 +43,12 @@ settings! {
 }
 
 impl Steering for Config {
-    fn steer(&self, now: &Situation<'_>) -> Twist {
+    type Memory = ();
+
+    fn steer(&self, now: &Situation<'_>, (): &mut ()) -> Twist {
         let goal = now.quarry.goal(0.0, HORIZON_S, self.distance_m);
-        let things = centres(&readings(now.scene, &now.quarry.place));
+        let things = CLUSTERS.rectangles(&readings(now.scene, &now.quarry.place));
+        let things: Vec<_> = things.iter().map(|thing| thing.centre).collect();
         let velocity = Vector2::new(now.last.linear_mps, 0.0);
         let pull = attraction(&goal, 2.0 * self.radius_m);
         let push = of_people(&others(now.scene)) + of_things(&things);
