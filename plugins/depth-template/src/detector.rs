@@ -139,7 +139,9 @@ impl DepthTemplate {
                 }
             }
         }
-        // Few places: the fit at a dropped cell stopped where it cost too much.
+        // Few places, and none at a person that was found: the fit at a dropped cell stopped where it cost
+        // too much.
+        dropped.keep_apart(tests_named::REFINE, view, &self.cells);
         for place in dropped.places_of(tests_named::REFINE) {
             let local = view.local(place.x, place.y, place.depth_m);
             place.measured = self.unrefined(scene, &local, later);

@@ -3,10 +3,11 @@
 use tagalong_core::{Funnel, Measured};
 
 use crate::candidates::tests_named;
+use crate::people::Cell;
 use crate::view::MetricImage;
 
 /// Places of one test that are kept of a scan.
-const MOST_PLACES: usize = 8;
+const MOST_PLACES: usize = 6;
 
 /// Least distance between two of them, m: a head wide.
 const APART_M: f64 = 0.2;
@@ -109,6 +110,18 @@ impl Drops {
         }
         let measured = against.map(|against| against.measured());
         entry.places.push(Place { measured, ..Place::new(x, y, depth_m) });
+    }
+
+    /// Forgets the places of a test that are near one that passed: somebody was found there.
+    pub fn keep_apart(&mut self, test: &str, view: &MetricImage, passed: &[Cell]) {
+        let Some(entry) = self.entries.iter_mut().find(|entry| entry.test == test) else { return };
+        entry.places.retain(|place| {
+            let apart = 2.0 * APART_M * view.px_per_m(place.depth_m);
+            passed.iter().all(|cell| {
+                let aside = (cell.x - place.x).abs().max((cell.y - place.y).abs());
+                aside as f64 >= apart
+            })
+        });
     }
 
     /// Returns the kept places of a test.
