@@ -396,7 +396,7 @@ fn ride(
         Ride::new(scene, contender, registry, &mut log)?
     };
     let ridden = RideJudge::default().judge(&ride);
-    log.finish(Some(&ridden))?;
+    log.finish(Some(&ridden), &ride.faults)?;
     Ok(Followed {
         suite: suite.clone(),
         swept: swept.clone(),
