@@ -133,6 +133,11 @@ impl Steering {
         self.controller.plugin().stand_off_m()
     }
 
+    /// Returns true if the controller keeps the person beside the robot or behind it.
+    pub fn leaves_view(&self) -> bool {
+        self.controller.plugin().leaves_view()
+    }
+
     /// Returns the controller's name and its inputs.
     pub fn inputs(&self) -> (&str, Inputs) {
         (self.controller.name(), self.controller.plugin().inputs())
