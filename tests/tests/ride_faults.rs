@@ -5,7 +5,7 @@ use std::path::Path;
 
 use tagalong_core::Reason;
 use tagalong_sim::{FaultKind, InjectedFault, Scene, Variant};
-use tagalong_trials::{Contender, Ride, Tick};
+use tagalong_trials::{Contender, Ride, RideJudge, Tick};
 
 /// Start of the fault, s.
 const AT_S: f64 = 5.0;
@@ -67,6 +67,15 @@ fn s1_a_camera_that_freezes_or_goes_dark_stops_the_robot() {
         assert_stands(kind, 0.8, &[Reason::Blind]);
     }
     assert_stands(FaultKind::DarkColumns, 1.2, &[Reason::Unknown]);
+}
+
+/// The track of a frozen picture stays where the person was, and the person walks on.
+#[test]
+fn a_frozen_camera_makes_nobody_a_wrong_person() {
+    let ridden = RideJudge::default().judge(&ride(FaultKind::FreezeDepth));
+    assert!(ridden.right_s > 3.0, "{ridden:?}");
+    assert_eq!((ridden.wrong_s, ridden.longest_wrong_s), (0.0, 0.0));
+    assert!(!ridden.kept, "nor is the person kept");
 }
 
 #[test]

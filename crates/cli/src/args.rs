@@ -232,7 +232,13 @@ its images, the truth, the commands (/cmd_vel) and their reasons (/follow/frames
 picture per frame beside it.
 
 --inject breaks the robot in the middle of a ride: a sensor freezes, goes dark, is late or repeats itself,
-the odometry is silent or wrong, the clock jumps, the wheels do not obey.
+the odometry is silent or wrong, the clock jumps, the wheels do not obey. Its kinds are
+  freeze-depth freeze-all freeze-laser blank-depth saturate-depth dark-columns noise-depth
+  laser-invalid laser-near delay resend drop drop-laser freeze-sensors drop-sensors
+  nan-odometry odometry-silent odometry-frozen odometry-wrong odometry-late-stamps
+  calibration-changed mount-moved mount-knocked wheels-stuck wheels-slip wheels-runaway
+  wheel-latency clock-back clock-forward enable-stuck, and random;
+docs/reference/faults.md describes them.
 
 With --approaches a person or a trolley comes at the robot from any side, at 0.2 to 1.6 m/s, at any
 moment of a short ride, and does not avoid it. Prints in how many approaches the robot moved at a
@@ -365,6 +371,17 @@ mod tests {
         for command in Cli::command().get_subcommands() {
             let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
             assert!(help.contains("Example"), "{}", command.get_name());
+        }
+    }
+
+    #[test]
+    fn the_kinds_of_injected_faults_are_in_the_help_and_in_the_reference() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/reference/faults.md");
+        let page = std::fs::read_to_string(path).expect("the page is in the clone");
+        let named: Vec<&str> = FOLLOW_HELP.split([' ', ',', '\n']).collect();
+        for kind in tagalong_sim::FaultKind::ALL {
+            assert!(named.contains(&kind.name()), "{kind}");
+            assert!(page.contains(&format!("| `{kind}` | ")), "{kind}");
         }
     }
 

@@ -300,6 +300,12 @@ pub trait Controller: Send {
     fn stand_off_m(&self) -> Option<f64> {
         None
     }
+
+    /// Returns true if the controller keeps the person where a camera that looks ahead does not see them:
+    /// beside the robot, or behind it.
+    fn leaves_view(&self) -> bool {
+        false
+    }
 }
 
 #[cfg(test)]

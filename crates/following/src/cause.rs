@@ -33,6 +33,8 @@ pub enum Cause {
 pub struct PlaceCause {
     /// The person there, if it is a tracked one.
     pub track: Option<TrackId>,
+    /// True if that is the person who is followed.
+    pub is_target: bool,
     /// The place in the robot frame, m.
     pub at: Point2<f64>,
     /// Distance of it from the outline of the robot, m.
@@ -51,6 +53,7 @@ impl Cause {
         asked: &[Allowance],
         monitor: &CollisionMonitor,
         tracks: &[Track],
+        target: Option<TrackId>,
     ) -> Option<Self> {
         if reason == Reason::Fault {
             return fault.map(Self::Fault);
@@ -66,13 +69,28 @@ impl Cause {
         };
         // The polygons stop and slow down whatever the path allows.
         if let Some((at, distance_m)) = monitor.place_in_zone(reason) {
-            return Some(Self::at_place(at, distance_m, None, is_person, tracks));
+            return Some(
+                Self::at_place(at, distance_m, None, is_person, tracks).for_target(target),
+            );
         }
         let stops = !reason.moves();
         let why = asked.iter().filter(|it| reason == if stops { it.stops } else { it.slower });
         let place = why.filter_map(|allowed| allowed.by).next()?;
         let limit_m = if stops { place.stop_m } else { place.slower_m };
-        Some(Self::at_place(place.at, place.distance_m, Some(limit_m), is_person, tracks))
+        let limit_m = Some(limit_m);
+        let cause = Self::at_place(place.at, place.distance_m, limit_m, is_person, tracks);
+        Some(cause.for_target(target))
+    }
+
+    /// Notes whether the person at the place is the one who is followed.
+    fn for_target(self, target: Option<TrackId>) -> Self {
+        match self {
+            Self::Place(place) => {
+                let is_target = place.track.is_some() && place.track == target;
+                Self::Place(PlaceCause { is_target, ..place })
+            }
+            other => other,
+        }
     }
 
     fn at_place(
@@ -90,7 +108,7 @@ impl Cause {
             }
         }
         let track = nearest.map(|(id, _)| id);
-        Self::Place(PlaceCause { track, at, distance_m, limit_m })
+        Self::Place(PlaceCause { track, is_target: false, at, distance_m, limit_m })
     }
 }
 
@@ -113,6 +131,7 @@ impl fmt::Display for Cause {
 impl fmt::Display for PlaceCause {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.track {
+            Some(id) if self.is_target => write!(f, "the followed person {id}")?,
             Some(id) => write!(f, "person {id}")?,
             None => {
                 let side = if self.at.y < 0.0 { "right" } else { "left" };
@@ -121,7 +140,7 @@ impl fmt::Display for PlaceCause {
                 write!(f, "the place {x:.1} m {way}, {y:.1} m to the {side}")?;
             }
         }
-        write!(f, ", {:.2} m from the robot, ", self.distance_m.max(0.0))?;
+        write!(f, ", {:.2} m from the edge of the robot, ", self.distance_m.max(0.0))?;
         match self.limit_m {
             Some(limit_m) => write!(f, "limit {limit_m:.2} m"),
             None => f.write_str("inside a zone of the settings"),
@@ -141,11 +160,15 @@ mod tests {
         let track = target(1.3, 0.1, Vector2::zeros()).with_id(TrackId(3)).with_confirmed(true);
         let at = Point2::new(1.1, 0.1);
         let person = Cause::at_place(at, 0.84, Some(1.5), true, std::slice::from_ref(&track));
-        assert_eq!(person.to_string(), "person 3, 0.84 m from the robot, limit 1.50 m");
+        assert_eq!(person.to_string(), "person 3, 0.84 m from the edge of the robot, limit 1.50 m");
+        let followed = person.clone().for_target(Some(TrackId(3))).to_string();
+        assert!(followed.starts_with("the followed person 3, 0.84 m from the edge"), "{followed}");
+        assert_eq!(person.clone().for_target(Some(TrackId(4))), person);
         let thing = Cause::at_place(at, 0.84, None, false, &[track]);
         assert_eq!(
             thing.to_string(),
-            "the place 1.1 m ahead, 0.1 m to the left, 0.84 m from the robot, inside a zone of the settings"
+            "the place 1.1 m ahead, 0.1 m to the left, 0.84 m from the edge of the robot, \
+             inside a zone of the settings"
         );
     }
 

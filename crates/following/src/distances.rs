@@ -1,3 +1,5 @@
+use std::fmt;
+
 use nalgebra::Point2;
 use serde::Serialize;
 use tagalong_geometry::Camera;
@@ -71,6 +73,55 @@ impl SafetyDistances {
     }
 }
 
+/// In lines, each with a line break at its end.
+impl fmt::Display for SafetyDistances {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            speed_mps,
+            stopping_m,
+            before_things_m,
+            separation_m,
+            least_separation_m,
+            followed_m,
+            turning_radius_m,
+            stop_polygon_m,
+            slowdown_polygon_m,
+            slowdown_ratio,
+            holds_s,
+            stands_after_s,
+            stands_after_m,
+        } = self;
+        write!(
+            f,
+            "  distances from the edge of the footprint (see docs/safety.md):\n  \
+             at {speed_mps} m/s it stops within {stopping_m:.2} m, and brakes for things from \
+             {before_things_m:.2} m on\n  \
+             near people it drives at {speed_mps} m/s only while they are {separation_m:.2} m away; it is \
+             slower where they are nearer, and stands below {least_separation_m:.2} m\n  \
+             it stops {followed_m:.2} m before the followed person, and earlier where they come nearer\n  \
+             when it turns, its corners sweep a circle with a radius of {turning_radius_m:.2} m around \
+             the middle of the robot\n  \
+             after the last image or scan its command holds for {holds_s:.2} s, then zero is commanded, and the robot \
+             stands after {stands_after_s:.2} s and {stands_after_m:.2} m in all\n"
+        )?;
+        if let Some(ahead_m) = stop_polygon_m {
+            writeln!(
+                f,
+                "  it neither drives nor turns while something is in the stop polygon, which reaches \
+                 {ahead_m:.2} m ahead"
+            )?;
+        }
+        if let Some(ahead_m) = slowdown_polygon_m {
+            writeln!(
+                f,
+                "  it drives at {slowdown_ratio} of its speed while something is in the slowdown polygon, \
+                 which reaches {ahead_m:.2} m ahead"
+            )?;
+        }
+        Ok(())
+    }
+}
+
 /// Returns the foremost corner of a polygon, m; `None` without corners.
 fn foremost_m(corners: &[[f64; 2]]) -> Option<f64> {
     corners.iter().map(|[x, _]| *x).reduce(f64::max)
@@ -128,6 +179,35 @@ mod tests {
         assert_eq!(found.holds_s, 0.25);
         assert!((found.stands_after_s - 1.15).abs() < 1e-9);
         assert!((found.stands_after_m - (0.9 * 0.25 + 0.405)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn distances_say_from_where_they_are() {
+        let distances = SafetyDistances {
+            speed_mps: 0.5,
+            stopping_m: 0.4,
+            before_things_m: 0.6,
+            separation_m: 3.0,
+            least_separation_m: 0.9,
+            followed_m: 0.8,
+            turning_radius_m: 0.25,
+            stop_polygon_m: None,
+            slowdown_polygon_m: None,
+            slowdown_ratio: 1.0,
+            holds_s: 0.25,
+            stands_after_s: 0.75,
+            stands_after_m: 0.3,
+        };
+        let lines = distances.to_string();
+        for part in [
+            "distances from the edge of the footprint",
+            "only while they are 3.00 m away",
+            "stands below 0.90 m",
+            "a radius of 0.25 m around the middle of the robot",
+            "holds for 0.25 s, then zero is commanded, and the robot stands after 0.75 s and 0.30 m",
+        ] {
+            assert!(lines.contains(part), "{part}: {lines}");
+        }
     }
 
     #[test]

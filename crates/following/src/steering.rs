@@ -133,6 +133,11 @@ impl Steering {
         self.controller.plugin().stand_off_m()
     }
 
+    /// Returns true if the controller keeps the person beside the robot or behind it.
+    pub fn leaves_view(&self) -> bool {
+        self.controller.plugin().leaves_view()
+    }
+
     /// Returns the controller's name and its inputs.
     pub fn inputs(&self) -> (&str, Inputs) {
         (self.controller.name(), self.controller.plugin().inputs())
@@ -205,12 +210,12 @@ impl Steering {
             asked.push(allowed);
             allowed
         });
-        let cause = Cause::of(command.reason, self.fault(), &asked, &self.monitor, tracks);
+        let target = target.map(|track| track.id);
+        let cause = Cause::of(command.reason, self.fault(), &asked, &self.monitor, tracks, target);
         // The search learns only now that its wish was blocked; it reacts in the next frame.
         let is_blocked =
             matches!(command.reason, Reason::Blocked | Reason::TooClose | Reason::Unknown);
         self.search.add_block(is_blocked, motion.dt);
-        let target = target.map(|track| track.id);
         let view = View::new(tracks, &frame.camera, frame.stamp);
         let lock = self.lock_by_sensors(lock, cause.as_ref(), frame.stamp);
         self.status = view.status(&lock, target, command.reason.name(), self.fault());

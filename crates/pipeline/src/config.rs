@@ -405,6 +405,7 @@ impl Builder<'_> {
         let Some(value) = value else { return Ok(None) };
         let mut section = Section::<PluginSettings>::new("controller", value)?;
         let config = section.config.take();
+        let distance = config.as_ref().and_then(|config| span_in(config, "stand_off_m"));
         let context = self.context(3, 0);
         let name = &section.settings.plugin;
         let plugin = section.at_plugin(self.registry.build_controller(name, config, &context))?;
@@ -412,7 +413,8 @@ impl Builder<'_> {
         // The stopping distance is known before the first frame, so an unsafe config is refused
         // here.
         if let Some(message) = too_near(plugin.stand_off_m(), robot, command_limiter) {
-            return Err(ConfigError::new(message).or_at(section.span_of("plugin")));
+            let place = distance.or_else(|| section.span_of("plugin"));
+            return Err(ConfigError::new(message).or_at(place));
         }
         let name = section.settings.plugin;
         let settings = self.settings.following();
@@ -433,11 +435,18 @@ fn too_near(
     if stops {
         return None;
     }
+    let margin_m = limiter.margin_m;
+    let way_m = stopping_m - margin_m;
     Some(format!(
-        "a robot at {} m/s needs {stopping_m:.2} m to stop, and follows at {distance_m} m: raise \
-         `stand_off_m` or lower `max_speed_mps` in [robot]",
+        "a robot at {} m/s needs {stopping_m:.2} m to stop ({way_m:.2} m, and `margin_m` of {margin_m:.2} m), \
+         and follows at {distance_m} m: raise `stand_off_m` or lower `max_speed_mps` in [robot]",
         robot.max_speed_mps
     ))
+}
+
+/// Returns the place of a key of a table.
+fn span_in(table: &Value<'_>, key: &str) -> Option<Range<usize>> {
+    table.get_ref().as_table()?.get(key).map(Spanned::span)
 }
 
 /// Refuses the former name of the role `track`.

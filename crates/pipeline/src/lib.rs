@@ -88,6 +88,7 @@
 
 mod appearance;
 mod builder;
+mod cautions;
 mod config;
 mod pipeline;
 mod preprocessors;

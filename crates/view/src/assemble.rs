@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::page::data::RunData;
+use crate::page::data::{EventData, RunData};
 use crate::page::events;
 use crate::page::frame::{frame_data, tests};
 use crate::page::moment::{Moment, TrackState};
@@ -10,7 +10,7 @@ use crate::page::robot::robot_data;
 use tagalong_app::missed::{Depths, Witness};
 use tagalong_app::remedies::Remedies;
 
-use crate::recording::Recording;
+use crate::recording::{FaultFacts, Recording};
 
 /// Returns the stamps of all frames of all runs, in their order.
 pub fn stamps(runs: &[Recording]) -> Vec<u64> {
@@ -46,10 +46,15 @@ pub fn witness(run: &Recording, stamps: &[u64], depths: &[Option<Depths>]) -> Wi
 pub fn run_data(run: &Recording, stamps: &[u64], remedies: &Remedies) -> RunData {
     let by_stamp: BTreeMap<u64, &Moment> = run.moments.iter().map(|m| (stamp_of(m), m)).collect();
     let moments: Vec<Option<&Moment>> = stamps.iter().map(|s| by_stamp.get(s).copied()).collect();
+    let times = times(stamps);
+    let mut events = events::of_run(&times, &moments);
+    events.extend(fault_events(&run.report.faults, &times));
+    // A fault comes before what follows from it in the same frame.
+    events.sort_by_key(|event| (event.i, event.kind != FAULT));
     RunData {
         name: run.config_name(),
         frames: moments.iter().map(|moment| moment.map(frame_data)).collect(),
-        events: events::of_run(&times(stamps), &moments),
+        events,
         tests: tests(moments.iter().flatten().map(|moment| &moment.notes), &run.config, remedies),
         hits: None,
         causes: Vec::new(),
@@ -58,9 +63,43 @@ pub fn run_data(run: &Recording, stamps: &[u64], remedies: &Remedies) -> RunData
     }
 }
 
+/// Kind of the events of injected faults.
+const FAULT: &str = "fault";
+
+/// Returns the begin and the end of each injected fault within the times of the page.
+fn fault_events(faults: &[FaultFacts], times: &[f64]) -> Vec<EventData> {
+    let mut events = Vec::new();
+    for fault in faults {
+        let ends = fault.to_s.map(|to_s| (to_s, "ends"));
+        for (at_s, verb) in std::iter::once((fault.from_s, "begins")).chain(ends) {
+            // The first frame that it may change.
+            if let Some(i) = times.iter().position(|t_s| *t_s >= at_s) {
+                let text = format!("The injected fault {} {verb}.", fault.kind);
+                events.push(EventData { i, kind: FAULT, text, ..EventData::default() });
+            }
+        }
+    }
+    events
+}
+
 #[cfg(test)]
 mod tests_of_times {
     use super::*;
+
+    #[test]
+    fn an_injected_fault_is_an_event_where_it_begins_and_ends() {
+        fn fault(from_s: f64, to_s: Option<f64>) -> FaultFacts {
+            FaultFacts { kind: "freeze-depth".into(), from_s, to_s }
+        }
+
+        let faults = [fault(0.15, Some(0.3)), fault(0.2, None), fault(9.0, Some(12.0))];
+        let events = fault_events(&faults, &[0.0, 0.1, 0.2, 0.3]);
+        let told: Vec<_> = events.iter().map(|event| (event.i, event.text.as_str())).collect();
+        let begins = "The injected fault freeze-depth begins.";
+        assert_eq!(told, [(2, begins), (3, "The injected fault freeze-depth ends."), (2, begins)]);
+        assert_eq!(faults[1].in_words(), "freeze-depth from 0.2 s to the end");
+    }
+
     use tagalong_app::frame_notes::FrameNotes;
 
     fn moment(stamp_ns: u64) -> Moment {

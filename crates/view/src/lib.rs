@@ -45,7 +45,7 @@ use tagalong_math::counted;
 
 use crate::assemble::{run_data, stamps, times, witness};
 use crate::film::Film;
-use crate::recording::{Recording, RideFacts, Span, Window, no_frames};
+use crate::recording::{FaultFacts, Recording, RideFacts, Span, Window, no_frames};
 use crate::truth::PageTruth;
 
 pub use crate::live::{Live, parse_address};
@@ -222,7 +222,11 @@ fn heading(runs: &[Recording], data: &PageData, notes: &[String]) -> Heading {
         format!("{name}: {frames}, {}, from {folder}", run.report.ended)
     });
     let rides = runs.iter().filter_map(|run| run.report.ride.as_ref());
-    let lines = described.chain(rides.map(RideFacts::summary)).collect();
+    let mut lines: Vec<String> = described.chain(rides.map(RideFacts::summary)).collect();
+    for run in runs.iter().filter(|run| !run.report.faults.is_empty()) {
+        let faults: Vec<String> = run.report.faults.iter().map(FaultFacts::in_words).collect();
+        lines.push(format!("{}: injected faults: {}", run.config_name(), faults.join("; ")));
+    }
     Heading { log, runs: lines, notes: notes.to_vec() }
 }
 

@@ -94,6 +94,28 @@ pub struct ReportFacts {
     pub config: FileFacts,
     /// Result of a ride; none for a run over a log.
     pub ride: Option<RideFacts>,
+    /// Faults that were injected into a ride.
+    #[serde(default)]
+    pub faults: Vec<FaultFacts>,
+}
+
+/// Fault that was injected into a ride.
+#[derive(Clone, Debug, Default, Deserialize)]
+pub struct FaultFacts {
+    /// Its kind.
+    pub kind: String,
+    /// Its begin, s since the first frame.
+    pub from_s: f64,
+    /// Its end, s; none for that of the ride.
+    pub to_s: Option<f64>,
+}
+
+impl FaultFacts {
+    /// Returns its times in words: "freeze-depth from 5.0 s to the end".
+    pub fn in_words(&self) -> String {
+        let end = self.to_s.map_or("the end".to_owned(), |to_s| format!("{to_s:.1} s"));
+        format!("{} from {:.1} s to {end}", self.kind, self.from_s)
+    }
 }
 
 /// Result of a ride, as `tagalong follow` judges it.

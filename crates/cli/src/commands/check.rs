@@ -10,7 +10,7 @@ use tagalong_app::outcome::{Ended, Failure, Outcome, print};
 use tagalong_app::suggest::check_log_path;
 use tagalong_config::{PathText, Registry};
 use tagalong_log::{FrameSource, Input, InputSettings, Inputs, Usage};
-use tagalong_pipeline::{BlindZone, Pipeline, SafetyDistances, Sources, Suits};
+use tagalong_pipeline::{BlindZone, Pipeline, Sources, Suits};
 
 /// Frames of the log that are tried.
 const FRAMES: u64 = 3;
@@ -33,25 +33,34 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
     let distances = pipeline.safety_distances();
     if format == Format::Text {
         // Told before the log is tried, for a log that does not fit changes nothing about the config.
-        let distances = distances.as_ref().map(told).unwrap_or_default();
+        let mut distances = distances.as_ref().map(ToString::to_string).unwrap_or_default();
+        if !distances.is_empty() && uses.contains(&Input::Laser.name()) {
+            distances += "  without a laser scanner it sees nobody outside of the view of its camera, beside it or \
+                          behind it\n";
+        }
         print(&format!("{}: valid; {}\n{distances}", config.display(), in_words(&needs, &uses)))?;
         for note in file.notes()? {
             print(&format!("  note: {note}\n"))?;
         }
     }
     let suits = pipeline.config().suits;
+    let alone = pipeline.cautions(None);
     let fit = log.map(|log| fits(&file, pipeline, &outer, log)).transpose()?;
     let blind_zone = fit.as_ref().and_then(|fit| fit.blind_zone);
     let data_lost = fit.as_ref().is_some_and(|fit| fit.data_lost);
     let seen_m = fit.as_ref().and_then(|fit| fit.traits.camera_height_m);
     let height_m = seen_m.or_else(|| outer.input.mount().map(|mount| mount.height_m));
     let unsuited = unsuited(height_m, fit.as_ref(), &suits);
+    let cautions = fit.as_ref().map_or(alone, |fit| fit.cautions.clone());
     let (topics, notes) = fit.map(|fit| (fit.topics, fit.notes)).unzip();
     print(&match format {
         Format::Text => {
             let mut out = String::new();
             if let Some(unsuited) = &unsuited {
                 let _ = writeln!(out, "  {unsuited}");
+            }
+            for caution in &cautions {
+                let _ = writeln!(out, "  warning: {caution}");
             }
             if let Some(zone) = &blind_zone {
                 out += &told_zone(zone);
@@ -67,7 +76,7 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
             let answer = serde_json::json!({
                 "config": config.display().to_string(), "needs": needs, "uses": uses,
                 "log": log.map(PathText), "topics": topics, "notes": notes, "unsuited": unsuited,
-                "distances": distances, "blind_zone": blind_zone,
+                "cautions": cautions, "distances": distances, "blind_zone": blind_zone,
             });
             format!("{answer:#}\n")
         }
@@ -94,6 +103,8 @@ struct Fit {
     traits: Traits,
     /// Region that the camera of the log does not see, for a config with a controller.
     blind_zone: Option<BlindZone>,
+    /// Warnings of the settings with the camera of the log.
+    cautions: Vec<String>,
 }
 
 /// Returns the warning of a log, or of the camera of a config alone, that `[suits]` excludes.
@@ -107,52 +118,6 @@ fn unsuited(camera_height_m: Option<f64>, fit: Option<&Fit>, suits: &Suits) -> O
             misfits.join("; ")
         )
     })
-}
-
-/// Returns the distances of a robot in lines.
-fn told(distances: &SafetyDistances) -> String {
-    let SafetyDistances {
-        speed_mps,
-        stopping_m,
-        before_things_m,
-        separation_m,
-        least_separation_m,
-        followed_m,
-        turning_radius_m,
-        stop_polygon_m,
-        slowdown_polygon_m,
-        slowdown_ratio,
-        holds_s,
-        stands_after_s,
-        stands_after_m,
-    } = distances;
-    let mut lines = format!(
-        "  distances from the edge of the footprint (see docs/safety.md):\n  \
-         at {speed_mps} m/s it stops within {stopping_m:.2} m, and brakes for things from \
-         {before_things_m:.2} m on\n  \
-         near people it drives at {speed_mps} m/s only while they are {separation_m:.2} m away; it is \
-         slower where they are nearer, and stands below {least_separation_m:.2} m\n  \
-         it stops {followed_m:.2} m before the followed person\n  \
-         when it turns, its corners sweep a circle with a radius of {turning_radius_m:.2} m around \
-         the middle of the robot\n  \
-         after the last image or scan its command holds for {holds_s:.2} s, then zero is commanded, and the robot \
-         stands after {stands_after_s:.2} s and {stands_after_m:.2} m in all\n"
-    );
-    if let Some(ahead_m) = stop_polygon_m {
-        let _ = writeln!(
-            lines,
-            "  it neither drives nor turns while something is in the stop polygon, which reaches \
-             {ahead_m:.2} m ahead"
-        );
-    }
-    if let Some(ahead_m) = slowdown_polygon_m {
-        let _ = writeln!(
-            lines,
-            "  it drives at {slowdown_ratio} of its speed while something is in the slowdown polygon, \
-             which reaches {ahead_m:.2} m ahead"
-        );
-    }
-    lines
 }
 
 /// Returns what the camera does not see in a line.
@@ -177,10 +142,12 @@ fn fits(
     pipeline.check_sources(sources_of(&source)).map_err(|why| cannot_steer(file, log, &why))?;
     let mut tried = 0;
     let mut blind_zone = None;
+    let mut cautions = Vec::new();
     while tried < FRAMES
         && let Some(item) = source.next_frame()
     {
         blind_zone = pipeline.blind_zone(&item.frame.camera);
+        cautions = pipeline.cautions(Some(&item.frame.camera));
         pipeline.step(&item.frame).map_err(Failure::failed)?;
         tried += 1;
     }
@@ -192,7 +159,7 @@ fn fits(
     let topics = used.map(ToString::to_string).collect();
     let notes = source.notes().to_vec();
     let traits = Traits::of(&source);
-    Ok(Fit { topics, notes, data_lost: source.data_lost(), traits, blind_zone })
+    Ok(Fit { topics, notes, data_lost: source.data_lost(), traits, blind_zone, cautions })
 }
 
 /// Returns the names of the inputs that a log has to have, or that are used where it has them.
@@ -228,39 +195,5 @@ fn in_words(needs: &[&str], uses: &[&str]) -> String {
         format!("needs {needs}")
     } else {
         format!("needs {needs}; uses {} where the log has it", uses.join(" and "))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn distances_say_from_where_they_are() {
-        let distances = SafetyDistances {
-            speed_mps: 0.5,
-            stopping_m: 0.4,
-            before_things_m: 0.6,
-            separation_m: 3.0,
-            least_separation_m: 0.9,
-            followed_m: 0.8,
-            turning_radius_m: 0.25,
-            stop_polygon_m: None,
-            slowdown_polygon_m: None,
-            slowdown_ratio: 1.0,
-            holds_s: 0.25,
-            stands_after_s: 0.75,
-            stands_after_m: 0.3,
-        };
-        let lines = told(&distances);
-        for part in [
-            "distances from the edge of the footprint",
-            "only while they are 3.00 m away",
-            "stands below 0.90 m",
-            "a radius of 0.25 m around the middle of the robot",
-            "holds for 0.25 s, then zero is commanded, and the robot stands after 0.75 s and 0.30 m",
-        ] {
-            assert!(lines.contains(part), "{part}: {lines}");
-        }
     }
 }

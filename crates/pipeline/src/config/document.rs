@@ -171,8 +171,11 @@ impl Document {
         let start = span.start.saturating_sub(base.start);
         let span = Range { start, end: span.end.saturating_sub(base.start) };
         let there = ConfigError::new(error.message).or_at(Some(span));
-        let shown = there.render(&base.path.display().to_string(), base.text());
-        ConfigError::new(format!("it extends {}, where:\n{shown}", base.path.display()))
+        // No file stands for a config that is part of the program.
+        let kind = if base.is_builtin { "the built-in " } else { "" };
+        let path = base.path.display().to_string();
+        let shown = there.render(&path, base.text());
+        ConfigError::new(format!("it extends {kind}{path}, where:\n{shown}"))
     }
 }
 

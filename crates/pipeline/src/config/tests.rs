@@ -428,6 +428,30 @@ fn a_robot_that_cannot_stop_before_the_person_is_refused() {
     }
 }
 
+#[test]
+#[cfg(feature = "plugins")]
+fn a_distance_that_is_too_small_is_shown_where_it_stands() {
+    use crate::ConfigSource;
+
+    let text = "extends = 'follow-depth.toml'\n[controller]\nconfig = { stand_off_m = 0.8 }\n";
+    let source = ConfigSource::from_text(text, "");
+    let refused = Pipeline::builder(&crate::builtin_registry()).build(&source);
+    let refused = refused.map(drop).expect_err("0.8 m").to_string();
+    for words in [
+        "config.toml:3:26: a robot at 0.9 m/s needs 1.25 m to stop (0.95 m, and `margin_m` of 0.30 m), and \
+         follows at 0.8 m",
+        "config = { stand_off_m = 0.8 }",
+    ] {
+        assert!(refused.contains(words), "{refused}");
+    }
+    let text = "extends = 'follow-depth.toml'\n[robot]\nmax_speed_mps = 0.9\n[command_limiter]\n\
+                reaction_s = 2.0\n";
+    let refused =
+        Pipeline::builder(&crate::builtin_registry()).build(&ConfigSource::from_text(text, ""));
+    let refused = refused.map(drop).expect_err("a late robot").to_string();
+    assert!(refused.contains("it extends the built-in follow-depth.toml, where:"), "{refused}");
+}
+
 /// Returns the seeds of the plugins, by their place in a config.
 fn seeds(run: u64) -> Vec<u64> {
     let seen = std::sync::Arc::new(std::sync::Mutex::new(Vec::new()));

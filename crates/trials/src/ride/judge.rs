@@ -3,7 +3,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Point2, Vector2};
 use serde::Serialize;
 use tagalong_core::{Reason, Track};
-use tagalong_pipeline::{FrameReport, Likeness};
+use tagalong_pipeline::{FrameReport, Likeness, LockState};
 use tagalong_sim::{Clearance, Truth};
 
 use super::{CrowdMeasures, Ride, Tick};
@@ -231,7 +231,7 @@ impl RideJudge {
                 at_s: seconds[at],
                 // A gap in the frames must not count as following for its whole length.
                 dt_s: (next_s - seconds[at]).clamp(0.0, LONGEST_PAUSE_S),
-                whom: before,
+                whom: known(before, report.lock.as_ref().map(|lock| lock.state)),
                 in_view: truth.is_some_and(|truth| self.is_in_view(truth)),
                 range_m: truth.map(|truth| truth.head_in_robot.xy().coords.norm()),
                 speed_mps: speed(&places, &seconds, at),
@@ -286,6 +286,16 @@ impl RideJudge {
                 judged.collect()
             })
             .collect()
+    }
+}
+
+/// Returns the followed person of a frame whose target is on `whom`, by the state of the lock. The tracks
+/// of a frozen picture stand where people were: the report says that it is not known whether they still
+/// do, and the robot stands.
+fn known(whom: Whom, state: Option<LockState>) -> Whom {
+    match (whom, state) {
+        (Whom::Wrong, Some(LockState::NotKnown)) => Whom::Nobody,
+        (whom, _) => whom,
     }
 }
 
@@ -517,6 +527,18 @@ mod tests {
         assert!(kept(1.5, 0.0), "a person at the distance to keep is no reason to move");
         assert!(!kept(3.0, 0.0), "the robot stayed behind");
         assert!(kept(3.0, 0.3), "it drove");
+    }
+
+    #[test]
+    fn a_target_of_which_the_lock_knows_nothing_is_no_wrong_person() {
+        for state in [None, Some(LockState::Locked), Some(LockState::Suspect)] {
+            assert_eq!(known(Whom::Wrong, state), Whom::Wrong, "{state:?}");
+        }
+        for (whom, judged) in
+            [(Whom::Wrong, Whom::Nobody), (Whom::Right, Whom::Right), (Whom::Nobody, Whom::Nobody)]
+        {
+            assert_eq!(known(whom, Some(LockState::NotKnown)), judged);
+        }
     }
 
     #[test]

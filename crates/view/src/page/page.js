@@ -504,9 +504,12 @@
       rect([column(part.from, number), 0, Math.max(1, column(part.to, number) - column(part.from, number)), COMMAND], { class: `motion ${part.motion}` }));
     parts.forEach((part, at) => part.append(svg("title", {}, motions[at].text)));
     parts.push(...lives.flatMap((life) => lifeMarks(life, number, top + row * (life.lane + 0.5), row)));
-    for (const event of run.events) if (event.kind === "missed") {
+    for (const event of run.events) if (event.kind === "missed" || event.kind === "fault") {
       const x = column(event.i, number);
-      parts.push(svg("line", { class: "gap", x1: x, x2: x, y1: height - 5, y2: height, "stroke-width": 2 }));
+      const isFault = event.kind === "fault";
+      const mark = svg("line", { class: isFault ? "fault" : "gap", x1: x, x2: x, y1: isFault ? 0 : height - 5, y2: height, "stroke-width": 2 });
+      if (isFault) mark.append(svg("title", {}, event.text));
+      parts.push(mark);
     }
     parts.push(svg("line", { class: "head", "stroke-width": 1.5, y1: 0, y2: height }));
     target.replaceChildren(...parts);
@@ -766,8 +769,8 @@
 
   const events = data.runs.flatMap((run, number) => run.events.map((event) => ({ ...event, t: data.t[event.i], run: number })))
     .sort((a, b) => a.i - b.i || a.run - b.run);
-  const SIGNS = { started: "●", lost: "○", found: "◐", ended: "■", recognised: "↺", doubt: "?", corrected: "↹", target: "◎", lock: "◆", drives: "▶", slower: "▽", stands: "▮", missed: "✕", switched: "⇄", "wrong person": "≠", "false track": "△" };
-  const BAD = ["missed", "switched", "wrong person", "false track"];
+  const SIGNS = { started: "●", lost: "○", found: "◐", ended: "■", recognised: "↺", doubt: "?", corrected: "↹", target: "◎", lock: "◆", drives: "▶", slower: "▽", stands: "▮", missed: "✕", switched: "⇄", "wrong person": "≠", "false track": "△", fault: "⚡" };
+  const BAD = ["missed", "switched", "wrong person", "false track", "fault"];
   const hiddenKinds = new Set();
   const knownKinds = new Set();
 

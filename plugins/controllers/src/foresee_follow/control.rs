@@ -2,6 +2,7 @@ use nalgebra::{Point2, Vector2};
 use tagalong_core::{Controller, EgoMotion, Input, Inputs, Scene, Twist, WheelSpeeds};
 
 use super::config::{Config, MOST};
+use super::cost::VIEW_RAD;
 use super::plan::{Drive, Planner};
 use super::scenery::Scenery;
 use crate::around::{Look, NearestObstacles};
@@ -55,6 +56,12 @@ impl Controller for ForeseeFollow {
 
     fn stand_off_m(&self) -> Option<f64> {
         Some(self.config.stand_off_m)
+    }
+
+    fn leaves_view(&self) -> bool {
+        // Behind a person who walks away the angle is 180 degrees.
+        let angle = self.config.angle_rad();
+        angle.is_some_and(|angle| std::f64::consts::PI - angle.abs() > VIEW_RAD)
     }
 }
 

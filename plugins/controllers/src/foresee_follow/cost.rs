@@ -16,7 +16,7 @@ const FARTHEST_M: f64 = 6.0;
 /// Part of the distance from the person at which it becomes tight.
 const LEAST_PART: f64 = 0.6;
 /// Bearing up to which a camera sees the person, rad.
-const VIEW_RAD: f64 = 0.5;
+pub(super) const VIEW_RAD: f64 = 0.5;
 /// Cost of a radian beyond it.
 const OUT_OF_VIEW: f64 = 0.5;
 /// Time up to which the forecast of the place of another person is one of a body, s.

@@ -4,7 +4,7 @@ use serde::Serialize;
 use tagalong_app::signals::Signals;
 use tagalong_log::write::WriteError;
 use tagalong_pipeline::FrameReport;
-use tagalong_sim::{Event, Scene, Simulation};
+use tagalong_sim::{Event, Scene, ScheduledFault, Simulation};
 use tagalong_simulate::Recorder;
 use tagalong_trials::{Ridden, SimulatedFrame, Tick, TrialError, Witness};
 
@@ -58,11 +58,16 @@ impl RideLog {
         Self { bar: Some(bar), ..self }
     }
 
-    /// Completes the log, then the folder with the result of the ride, if it has one.
+    /// Completes the log, then the folder with the result of the ride, if it has one, and with the faults
+    /// that were injected.
     ///
     /// # Errors
     /// The first error in writing.
-    pub fn finish(self, ridden: Option<&Ridden>) -> Result<(), TrialError> {
+    pub fn finish(
+        self,
+        ridden: Option<&Ridden>,
+        faults: &[ScheduledFault],
+    ) -> Result<(), TrialError> {
         let finished = self.recorder.map_or(Ok(()), Recorder::finish);
         if let Some(error) = self.failed.or(finished.err().map(|error| error.to_string())) {
             return Err(TrialError::Witness(error));
@@ -72,7 +77,7 @@ impl RideLog {
             None => "complete".into(),
         };
         let Some(files) = self.files else { return Ok(()) };
-        files.finish(&ended, ridden).map_err(|failure| TrialError::Witness(failure.message))
+        files.finish(&ended, ridden, faults).map_err(|failure| TrialError::Witness(failure.message))
     }
 
     fn note(&mut self, write: impl FnOnce(&mut Recorder) -> Result<(), WriteError>) {

@@ -273,6 +273,9 @@ fn jobs(args: &FollowArgs, seeds: Seeds, registry: &Registry) -> Result<Vec<Job>
         if let Some(note) = unsuited(&contender.name, &pipeline.config().suits, scenes) {
             say(&format!("note: {note}"));
         }
+        for caution in pipeline.cautions(None) {
+            say(&format!("note: {}: {caution}", contender.name));
+        }
     }
     Ok(jobs)
 }
@@ -396,7 +399,7 @@ fn ride(
         Ride::new(scene, contender, registry, &mut log)?
     };
     let ridden = RideJudge::default().judge(&ride);
-    log.finish(Some(&ridden))?;
+    log.finish(Some(&ridden), &ride.faults)?;
     Ok(Followed {
         suite: suite.clone(),
         swept: swept.clone(),

@@ -15,6 +15,7 @@ use tagalong_log::write::{
 };
 use tagalong_pipeline::{FrameReport, ResolvedConfig};
 use tagalong_render::{Overlay, OverlayData, OverlayStyle};
+use tagalong_sim::ScheduledFault;
 use tagalong_simulate::{CAMERA_FRAME, log_stamp};
 use tagalong_trials::{Ridden, SimulatedFrame};
 
@@ -28,6 +29,8 @@ pub struct RunFiles {
     log: PathBuf,
     config: FileFacts,
     seed: u64,
+    /// Time of the first frame, s since the start of the scene.
+    first_s: Option<f64>,
 }
 
 /// `report.json` of a ride.
@@ -40,6 +43,8 @@ struct RideReport<'a> {
     log: &'a FileFacts,
     #[serde(skip_serializing_if = "Option::is_none")]
     ride: Option<&'a Ridden>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    faults: Vec<ScheduledFault>,
 }
 
 /// File of a ride.
@@ -47,6 +52,16 @@ struct RideReport<'a> {
 struct FileFacts {
     name: String,
     sha256: String,
+}
+
+/// Returns faults with their times since the first frame, as the page of the ride has them.
+fn since(first_s: f64, faults: &[ScheduledFault]) -> Vec<ScheduledFault> {
+    let mut shifted = faults.to_vec();
+    for fault in &mut shifted {
+        fault.from_s -= first_s;
+        fault.to_s -= first_s;
+    }
+    shifted
 }
 
 /// Returns the folder of the ride with this log: its name without the ending.
@@ -94,6 +109,7 @@ impl RunFiles {
             log: log.to_owned(),
             config: facts,
             seed: config.seed,
+            first_s: None,
         })
     }
 
@@ -116,6 +132,7 @@ impl RunFiles {
             return Ok(());
         }
         self.timings.add_frame(&report.timings);
+        self.first_s.get_or_insert(report.stamp.nanos() as f64 * 1e-9);
         // The clock of a ride begins at zero, that of its log does not.
         let stamp = log_stamp(report.stamp.nanos());
         let camera = &simulated.frame.camera;
@@ -136,11 +153,17 @@ impl RunFiles {
         self.tracks.write_json(FRAME_NOTES_TOPIC, stamp, &notes)
     }
 
-    /// Completes the folder of a ride whose log is complete; `ridden` is its result.
+    /// Completes the folder of a ride whose log is complete; `ridden` is its result, `faults` are those
+    /// that were injected.
     ///
     /// # Errors
     /// A file that cannot be read or written.
-    pub fn finish(self, ended: &str, ridden: Option<&Ridden>) -> Result<(), Failure> {
+    pub fn finish(
+        self,
+        ended: &str,
+        ridden: Option<&Ridden>,
+        faults: &[ScheduledFault],
+    ) -> Result<(), Failure> {
         let name = self.log.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let log = FileFacts { name, sha256: sha256_of_file(&self.log)? };
         let report = RideReport {
@@ -150,6 +173,7 @@ impl RunFiles {
             seed: self.seed,
             log: &log,
             ride: ridden,
+            faults: since(self.first_s.unwrap_or(0.0), faults),
         };
         let report = to_json("report.json", &report)?;
         let timings = to_json("timings.json", &self.timings.summary())?;

@@ -88,7 +88,12 @@ fn notes(judge: &RideJudge, seeds: Seeds) -> Vec<String> {
         "intervals: 95 %, over rides; Wilson for rides that were kept, and for what happens several \
          times in a ride with the spread between rides; Student for times"
             .into(),
-        "in view: share of the time in which the camera saw the person".into(),
+        format!(
+            "in view: share of the time in which at least {:.0} % of the upper body was in the image and not \
+             hidden, up to {} m away; legs alone do not count",
+            100.0 * judge.min_visible,
+            judge.max_range_m
+        ),
         format!(
             "refound: losses of the person that ended within {} s of the return into view (up to {} m \
              away)",
@@ -107,7 +112,7 @@ fn notes(judge: &RideJudge, seeds: Seeds) -> Vec<String> {
             judge.most_wrong_s, judge.refind_s
         ),
         "wrong: share of the time of the lock in which it was on another person or a thing, also while \
-         the robot stood".into(),
+         the robot stood; not while a frozen sensor makes the lock `not known`".into(),
         "contacts: rides in which the robot touched a person or a thing, and the least clearance".into(),
         "ms/frame: 95th percentile of the processor time of the pipeline's thread".into(),
     ]

@@ -242,7 +242,7 @@ fn ride(
     }
     let mut watch = ApproachWatch::new(scene, &mut log);
     let ride = Ride::new(scene, job.contender, registry, &mut watch)?;
-    log.finish(None)?;
+    log.finish(None, &[])?;
     // A ride that a signal cut short says nothing.
     if signals.received().is_some() {
         return Ok(None);
