@@ -7,7 +7,7 @@
 //! * [`mean`], [`mean_and_deviation`], [`median`], [`percentile`]: summaries of values.
 //! * [`mean_interval`], [`draws_interval`], [`wilson`], [`clustered_share`],
 //!   [`exact_upper_bound`]: how far a figure can be trusted; [`paired_gain`], [`sign_flip`],
-//!   [`holm`]: how far a difference can.
+//!   [`holm`], [`draws_needed`]: how far a difference can.
 //! * [`matching`]: the assignment of rows to columns with the greatest weight, for metrics and for
 //!   associators.
 //! * [`exp2_of_negative`]: an exponential function for loops over many numbers.
@@ -29,5 +29,5 @@ pub use intervals::{
 };
 pub use power::exp2_of_negative;
 pub use random::{ChaCha, RandomSource, SplitMix64, XorShift64, fingerprint, mix, number_at};
-pub use significance::{Gain, holm, is_significant, paired_gain, sign_flip};
+pub use significance::{Gain, draws_needed, holm, is_significant, paired_gain, sign_flip};
 pub use summary::{mean, mean_and_deviation, median, percentile};

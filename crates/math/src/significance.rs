@@ -38,9 +38,31 @@ pub fn paired_gain(a: &[f64], b: &[f64]) -> Option<Gain> {
 }
 
 /// Returns true if a p-value is significant at the confidence of the intervals. That of fewer than
-/// six draws never is: 2 of 2^5 patterns are 6 %.
+/// six draws never is: 2 of 2^5 patterns are 6 %. After a correction it takes more ([`draws_needed`]).
 pub fn is_significant(p_value: f64) -> bool {
     p_value < 1.0 - CONFIDENCE
+}
+
+/// Returns the least number of draws with which a difference can be significant by [`sign_flip`] where
+/// so many are compared and corrected by [`holm`]: the least of them has to stay below the level
+/// after it is multiplied by their number.
+///
+/// ```
+/// assert_eq!([1, 3, 6].map(tagalong_math::draws_needed), [6, 7, 8]);
+/// ```
+pub fn draws_needed(comparisons: usize) -> usize {
+    // Beyond the exact test the least p-value is 1 in 100,000, as with about 17 draws.
+    let mut draws = 1;
+    while draws < EXACT_UP_TO && !is_significant(least_p_value(draws) * comparisons as f64) {
+        draws += 1;
+    }
+    draws
+}
+
+/// Returns the p-value of so many draws that all differ the same way: one pattern of signs and its
+/// opposite are as far from zero.
+fn least_p_value(draws: usize) -> f64 {
+    2.0 / (1u64 << draws) as f64
 }
 
 /// Returns the two-sided p-value of the hypothesis that differences lie symmetrically about
@@ -189,6 +211,18 @@ mod tests {
 
         assert!((1..6).all(|draws| !is_significant(same_way(draws))));
         assert!(is_significant(same_way(6)));
+    }
+
+    #[test]
+    fn a_correction_takes_as_many_draws_as_are_said_to_be_needed() {
+        for comparisons in 1..60 {
+            let needed = draws_needed(comparisons);
+            for (draws, can_be) in [(needed - 1, false), (needed, true)] {
+                let p_value = sign_flip(&vec![0.1; draws]).expect("draws");
+                let corrected = holm(&vec![p_value; comparisons]);
+                assert_eq!(is_significant(corrected[0]), can_be, "{draws} of {comparisons}");
+            }
+        }
     }
 
     #[test]

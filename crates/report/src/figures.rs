@@ -50,8 +50,11 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// Returns the figure of a task, if it is finite.
+    /// Returns the figure of a task, if it is finite; of single frames none that needs more than one.
     pub fn of(&self, place: ComparisonSpace, task: &TaskResult) -> Option<f64> {
+        if task.single_frames && OVER_TIME.contains(&self.name) {
+            return None;
+        }
         place.scores(task).and_then(self.of).filter(|v| v.is_finite())
     }
 
@@ -90,6 +93,18 @@ pub fn has_few_scores(scores: &Scores) -> bool {
 pub fn lamr_of_enough_scores(scores: &Scores) -> Option<f64> {
     scores.lamr.filter(|_| !has_few_scores(scores))
 }
+
+/// Figures of what happens over several frames.
+const OVER_TIME: [&str; 8] = [
+    "HOTA",
+    "AssA",
+    "MOTA",
+    "IDF1",
+    "IDSW",
+    "inherited_ids",
+    "wrong_person_s",
+    "time_to_confirm_mean_s",
+];
 
 /// Figure that ranks the pipelines.
 pub const MAIN: &Figure = &FIGURES[0];

@@ -106,6 +106,9 @@ pub struct TaskResult {
     pub duration_s: f64,
     /// True if part of the log was lost or could not be used.
     pub data_lost: bool,
+    /// True if nothing is tracked over the frames of the log: figures over time mean nothing.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub single_frames: bool,
     /// Figures in the image (IoU), if the truth has boxes.
     pub image: Option<Scores>,
     /// Figures on the floor (metres), if the truth has positions.

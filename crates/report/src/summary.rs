@@ -91,7 +91,8 @@ pub struct PairSummary {
 }
 
 impl PairSummary {
-    /// Returns true if the corrected p-value is below 0.05, which takes six logs at least.
+    /// Returns true if the corrected p-value is below 0.05, which takes six logs at least, and more
+    /// where several pairs are compared.
     pub fn is_clear(&self) -> bool {
         is_significant(self.p_corrected)
     }
@@ -111,6 +112,11 @@ impl Summary {
             Figure::at(place).for_each(|figure| mark_best(&mut pipelines, figure, place));
         }
         Self { pipelines, pairs: pairs(&view) }
+    }
+
+    /// Returns the number of pairs that are compared by a figure.
+    pub(crate) fn pairs_by(&self, figure: &str) -> usize {
+        self.pairs.iter().filter(|pair| pair.figure == figure).count()
     }
 
     /// Returns the entry of a pipeline.

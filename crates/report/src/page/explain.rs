@@ -51,6 +51,10 @@ fn figures() -> Markup {
         .filter(|f| known.insert(f.name))
         .collect::<Vec<_>>();
     html! {
+        dt { "Done" }
+        dd { "Tasks that ran to their end, of those planned." }
+        dt { "People found" }
+        dd { "People of the truth with a track on them in at least one frame, of all people." }
         @for figure in all {
             dt { (figure_name(figure)) " " span class="ends" { (if figure.higher_is_better { "higher is better" } else { "lower is better" }) } }
             dd { (figure.meaning) }

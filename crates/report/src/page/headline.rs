@@ -1,5 +1,5 @@
 use maud::{Markup, html};
-use tagalong_math::counted;
+use tagalong_math::{counted, draws_needed};
 
 use super::pairs::p_text;
 use super::{Page, cell, column, no_cell, number, table, was_skipped};
@@ -66,9 +66,23 @@ impl Page<'_> {
                 "The difference is clear (" (p_of(pair)) ")."
             } @else if let Some(pair) = pair {
                 "These logs do not tell the two apart (" (p_of(pair)) ", "
-                (counted(pair.logs, "log")) " in common; it takes at least six)."
+                (counted(pair.logs, "log")) " in common)."
+                @if let Some(why) = self.too_few_logs(pair) { " " (why) "." }
             } @else { "No log in common tells the two apart." }
             @if let Some(why) = self.why_of_pair(&first.0.pipeline, &second.0.pipeline) { " " (why) "." }
+        })
+    }
+
+    /// Says that a pair has fewer logs in common than any clear difference takes, if so.
+    fn too_few_logs(&self, pair: &PairSummary) -> Option<String> {
+        let pairs = self.summary.pairs_by(&pair.figure);
+        let needed = draws_needed(pairs);
+        ((pair.logs as usize) < needed).then(|| {
+            format!(
+                "With {} and {} no difference can be clear: {needed} logs are needed",
+                counted(pair.logs, "log"),
+                counted(pairs, "pair")
+            )
         })
     }
 
@@ -216,7 +230,7 @@ fn short_title(meaning: &str) -> &str {
 pub(super) fn figure_name(figure: &Figure) -> String {
     let name = match figure.name {
         "inherited_ids" => "Inherited IDs",
-        "fp_per_frame" => "False / frame",
+        "fp_per_frame" => "FP / frame",
         "time_to_confirm_mean_s" => "To confirm",
         "wrong_person_s" => "Wrong person",
         "position_error_mean_m" => "Position error",

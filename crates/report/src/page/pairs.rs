@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 
 use maud::{Markup, html};
-use tagalong_math::counted;
+use tagalong_math::{counted, draws_needed};
 
 use super::events::{event_id, kind};
 use super::headline::{ends_of, place_where};
@@ -77,12 +77,16 @@ impl Page<'_> {
             p {
                 "Each pair is compared on the logs that both finished, log by log, so that a hard log counts "
                 "the same for both. p is that of the exact sign-flip permutation test over logs. "
-                strong { "Clear" } " means p below 0.05, which takes six logs at least"
+                strong { "Clear" } " means p below 0.05"
                 @if self.view.pipelines.len() > 2 {
-                    ", after Holm's correction for all pairs that are compared by the same figure: "
+                    " after Holm's correction for all pairs that are compared by the same figure: "
                     "without it, one of twenty pairs would be below 0.05 by chance"
                 }
-                ". The figures are not corrected for each other: choose the one that matters before looking."
+                @if let Some((pairs, needed)) = self.logs_needed() {
+                    ". With " (counted(pairs, "pair")) " that takes " (needed) " logs at least"
+                }
+                ". The interval is Student's, of one pair alone, and no part of that test: it can leave out 0 beside "
+                "\"not clear\". The figures are not corrected for each other: choose the one that matters before looking."
             }
             @if self.view.pipelines.len() > 2 { (self.matrix()) }
             @let pairs = self.described_pairs();
@@ -98,6 +102,15 @@ impl Page<'_> {
                 p { "Described is the best pipeline against the next ones; all pairs are in report.json." }
             }
         })
+    }
+
+    /// Returns the number of pairs that are compared by the main figure, and that of the logs without
+    /// which none of them can be clear.
+    fn logs_needed(&self) -> Option<(usize, usize)> {
+        let shown = ComparisonSpace::ALL.into_iter();
+        let mut counts = shown.map(|place| self.summary.pairs_by(&MAIN.key(place)));
+        let pairs = counts.find(|pairs| *pairs > 0)?;
+        Some((pairs, draws_needed(pairs)))
     }
 
     /// Says in one line in what a pair differs: people found, the test that costs the worse one most, and

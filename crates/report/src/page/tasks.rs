@@ -1,4 +1,4 @@
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use maud::{Markup, html};
 use tagalong_math::counted;
@@ -12,6 +12,22 @@ use crate::model::{Outcome, TaskResult};
 /// Name of an outcome that is a fault, not a choice.
 const FAILED: &str = "failed";
 
+/// Returns tasks by outcome and reason: one reason may skip a pipeline on many logs.
+fn by_reason<'a>(
+    tasks: &[(&'a TaskResult, (&'a str, &'a str))],
+) -> BTreeMap<(&'a str, &'a str), Vec<&'a TaskResult>> {
+    let mut reasons: BTreeMap<(&str, &str), Vec<&TaskResult>> = BTreeMap::new();
+    for (task, reason) in tasks {
+        reasons.entry(*reason).or_default().push(*task);
+    }
+    reasons
+}
+
+/// Returns the different names in tasks, in their order.
+fn names<'a>(tasks: &[&'a TaskResult], name: fn(&TaskResult) -> &String) -> BTreeSet<&'a str> {
+    tasks.iter().copied().map(|task| name(task).as_str()).collect()
+}
+
 impl Page<'_> {
     pub(super) fn failed(&self) -> Option<Markup> {
         let not_done: Vec<_> =
@@ -21,13 +37,13 @@ impl Page<'_> {
         // Failures are to be seen; of skipped tasks, which no log suits, there may be hundreds.
         let is_open = not_done.len() <= MOST_UNFOLDED
             || not_done.iter().any(|(_, (outcome, _))| *outcome == FAILED);
-        let head = html! { (column("Pipeline", None)) (column("Log", None)) (column("Seed", None)) (column("Outcome", None)) (column("Why", None)) };
+        let head = html! { (column("Pipelines", None)) (column("Logs", None)) (column("Tasks", None)) (column("Outcome", None)) (column("Why", None)) };
         let body = html! {
-            @for (task, (outcome, why)) in &not_done {
+            @for ((outcome, why), tasks) in &by_reason(&not_done) {
                 tr {
-                    th scope="row" { (key(self.series(&task.pipeline), &task.pipeline)) }
-                    td class="log" { (task.log) }
-                    (cell(task.seed as f64, &html! { (task.seed) }))
+                    th scope="row" { @for name in names(tasks, |task| &task.pipeline) { (key(self.series(name), name)) " " } }
+                    td class="log" { (names(tasks, |task| &task.log).into_iter().collect::<Vec<_>>().join(", ")) }
+                    (cell(tasks.len() as f64, &html! { (tasks.len()) }))
                     td { @if *outcome == FAILED { strong class="bad" { "✕ failed" } } @else { (outcome) } }
                     td class="why" { (why) }
                 }
