@@ -5,7 +5,7 @@ use super::{Axis, Scale, px};
 const WIDTH: f64 = 120.0;
 
 /// Width of the picture of an interval, which stands beside its value.
-const INTERVAL_WIDTH: f64 = 60.0;
+const INTERVAL_WIDTH: f64 = 48.0;
 
 /// Renders a bar from zero for a cell of a table; `whisker` is a second, greater value. The numbers
 /// stand beside it, so it is hidden from screen readers.
@@ -32,8 +32,8 @@ pub fn interval(estimate: f64, ends: Option<[f64; 2]>, range: [f64; 2]) -> Marku
     let ends = ends.and_then(|[low, high]| Some([axis.at(low)?, axis.at(high)?]));
     let zero = (range[0] < 0.0 && range[1] > 0.0).then(|| axis.at(0.0)).flatten();
     html! {
-        svg class="beside" viewBox="0 0 60 14" width="60" height="14" aria-hidden="true" {
-            line class="rail" x1="1" x2="59" y1="7" y2="7" {}
+        svg class="beside" viewBox="0 0 48 14" width="48" height="14" aria-hidden="true" {
+            line class="rail" x1="1" x2="47" y1="7" y2="7" {}
             @if let Some(zero) = zero {
                 line class="zero" x1=(px(zero)) x2=(px(zero)) y1="0" y2="14" {}
             }
