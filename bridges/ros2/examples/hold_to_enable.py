@@ -4,6 +4,9 @@
     ros2 run joy joy_node                                          # on the same machine
     python3 bridges/ros2/examples/hold_to_enable.py --ros-args -p button:=4
 
+On a TurtleBot 4 buttons 4 and 5 are those of its own teleoperation, and its joy node runs already: take
+`-p button:=6` (L2) and leave out the first line.
+
 It publishes nothing while the button is free: the robot stands then, and goes on with the next press
 (after a reset, if it was stopped). joy_node repeats the state of the gamepad; what is older than 0.2 s
 enables nothing. Before a ride hold the button, and pull the cable or the battery of the gamepad: the

@@ -22,10 +22,12 @@ use crate::summary::Summary;
 use crate::wheels::{CommandCounts, SwitchHandle, Wheels};
 use crate::{BridgeError, Options};
 
+mod enable;
 mod nav2;
 mod out;
 mod wheels;
 
+use enable::{change_of_publishers, nobody, remedy};
 use out::Out;
 use wheels::{drive, take_enable, tell_untimely};
 
@@ -165,6 +167,9 @@ impl Bridge {
         tell(&format!("reads {}", topics.join(", ")));
         if self.wheels.is_none() {
             tell("the config has no controller: no commands");
+        }
+        for caution in self.pipeline.cautions(None) {
+            tell(&format!("warning: {caution}"));
         }
         self.tell_action(tell);
     }
@@ -308,10 +313,13 @@ impl Bridge {
         }
         let permission = self.wheels.as_ref().map(|wheels| wheels.switch().permission());
         if let Some(permission) = permission.filter(|now| Some(*now) != self.told) {
-            tell(&format!("{}{}", permission.cause(), self.remedy(permission)));
+            let remedy = remedy(permission, self.gates.enable.discovered(), &self.options);
+            tell(&format!("{}{remedy}", permission.cause()));
             self.told = Some(permission);
         }
-        self.callers.desk.turn(permission, self.pipeline.fault());
+        let enables = self.gates.enable.discovered();
+        let note = permission.and_then(|now| nobody(now, enables, &self.options.enable));
+        self.callers.desk.turn(permission, self.pipeline.fault(), note);
         let header = Header::new(self.clock.now(), "tagalong");
         self.out.beat(header);
         self.diagnostics.update(Status {
@@ -321,7 +329,7 @@ impl Bridge {
             permission,
             fault: self.pipeline.fault(),
             rivals: self.rivals,
-            enable_publishers: self.gates.enable.discovered(),
+            enable_publishers: enables,
             untimely: self.gates.enable.untimely() + self.gates.reset.untimely(),
             malformed: self.inbox.traffic().values().map(|topic| topic.malformed).sum(),
             is_resting: false,
@@ -329,33 +337,15 @@ impl Bridge {
         });
     }
 
-    fn remedy(&self, permission: Permission) -> String {
-        let Options { enable, reset, .. } = &self.options;
-        match permission {
-            Permission::Granted => String::new(),
-            Permission::NotEnabled | Permission::Expired => {
-                format!(": the robot stands until `true` comes on {enable}")
-            }
-            Permission::NeedsRelease => format!(
-                ": `true` on {enable} has come since before the reset; the robot stands until it \
-                 ceases, and comes again"
-            ),
-            Permission::Latched(CONTESTED) => format!(
-                ": the robot stands, because two hands at one switch cannot stop each other; end all \
-                 publishers on {enable} but one (`ros2 topic info --verbose` names them), then send a \
-                 message on {reset}, and begin to send `true` on {enable}"
-            ),
-            Permission::Latched(_) => format!(
-                ": the robot stands until a message on {reset}, after which `true` begins on {enable}"
-            ),
-        }
-    }
-
     /// Counts the publishers on the topics of the switch and on that of the commands, and tells what
     /// does not count for them.
     fn look_at_publishers(&mut self, tell: &dyn Fn(&str)) {
         let Options { enable, reset, command, .. } = &self.options;
         let [enables, resets, rivals] = self.network.others_on([enable, reset, command]);
+        let before = self.gates.enable.discovered();
+        if let Some(change) = change_of_publishers(before, enables, enable) {
+            tell(&change);
+        }
         self.gates.enable.set_discovered(enables);
         self.gates.reset.set_discovered(resets);
         if enables > 1 {

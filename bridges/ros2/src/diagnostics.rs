@@ -181,6 +181,9 @@ impl Status {
                 (WARN, "no following server of Nav2".into())
             }
             _ if self.malformed > 0 => (WARN, "messages that do not decode".into()),
+            Some(permission) if self.enable_publishers == 0 && !permission.is_granted() => {
+                (OK, format!("{}: nobody publishes the enable", permission.cause()))
+            }
             Some(permission) => (OK, permission.cause().into()),
             None => (OK, "tracks people".into()),
         }
@@ -217,9 +220,12 @@ mod tests {
         let missing = Status { driver: Some(DriverState::Missing), ..well };
         let unconfirmed = Status { driver: Some(DriverState::Unconfirmed), ..fault };
         let contested = Status { enable_publishers: 2, ..well };
+        let not_enabled = Some(Permission::NotEnabled);
+        let unheard = Status { permission: not_enabled, enable_publishers: 0, ..well };
         for (status, level, message) in [
             (well, OK, "enabled"),
             (Status { permission: latched, ..well }, WARN, "switched off"),
+            (unheard, OK, "not enabled: nobody publishes the enable"),
             (contested, ERROR, "2 publishers of the enable: end all but one"),
             (fault, ERROR, "fault: odometry jumped"),
             (missing, WARN, "no following server of Nav2"),

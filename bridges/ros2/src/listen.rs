@@ -16,6 +16,20 @@ const ATTEMPT: Duration = Duration::from_millis(500);
 /// transforms, but each is better with them.
 const GATHER: Duration = Duration::from_secs(2);
 
+/// The variable of ROS 2 that says how far nodes look for each other.
+const RANGE: &str = "ROS_AUTOMATIC_DISCOVERY_RANGE";
+
+/// Says why no topic of another node may be there; `range` is the value of [`RANGE`] for this program.
+fn silence(domain: u16, range: Option<&str>) -> String {
+    let set = range.map_or("not set".to_owned(), |range| format!("`{range}`"));
+    format!(
+        "no topic of another node is on ROS domain {domain}: compare ROS_DOMAIN_ID with that of the robot's \
+         nodes; let their {RANGE} be SUBNET (here it is {set}; this program always looks by multicast, and \
+         asks no ROS_STATIC_PEERS); and see that the network passes multicast (`ros2 multicast receive` \
+         here, `ros2 multicast send` there)"
+    )
+}
+
 /// Listens until all inputs of the pipeline are there; returns `None` if `is_over` before.
 pub(crate) fn listen(
     options: &Options,
@@ -74,9 +88,29 @@ pub(crate) fn listen(
                 ears.retain(|ear| source.topics().any(|topic| topic == ear.topic()));
                 return Ok(Some((source, ears)));
             }
-            Err(missing) if is_late => return Err(missing),
+            Err(missing) if is_late => {
+                if network.topics().is_empty() {
+                    let range = std::env::var(RANGE).ok();
+                    tell(&silence(options.domain, range.as_deref()));
+                }
+                return Err(missing);
+            }
             _ => {}
         }
     }
     Ok(None)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_network_without_topics_is_explained() {
+        let words = silence(7, Some("LOCALHOST"));
+        for part in ["ROS domain 7", "here it is `LOCALHOST`", "multicast", "ROS_STATIC_PEERS"] {
+            assert!(words.contains(part), "{part}: {words}");
+        }
+        assert!(silence(0, None).contains("here it is not set"));
+    }
 }

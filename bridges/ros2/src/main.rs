@@ -11,6 +11,9 @@ use tagalong_ros2::{Options, run};
 
 fn main() -> ExitCode {
     let options = Options::parse();
+    if options.check {
+        return check(&options);
+    }
     let stop = Arc::new(AtomicBool::new(false));
     let signal = Arc::new(AtomicUsize::new(0));
     let listening = [SIGINT, SIGTERM].into_iter().try_for_each(|number| {
@@ -27,6 +30,20 @@ fn main() -> ExitCode {
             eprint!("{summary}");
             let signal = signal.load(Ordering::Relaxed);
             ExitCode::from(if signal == 0 { 0 } else { 128 + signal as u8 })
+        }
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+/// Checks the config alone.
+fn check(options: &Options) -> ExitCode {
+    match options.checked(&tagalong::builtin_registry()) {
+        Ok(lines) => {
+            print!("{lines}");
+            ExitCode::SUCCESS
         }
         Err(error) => {
             eprintln!("error: {error}");

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use tagalong::config::Registry;
 use tagalong::log::{InputSettings, Limits};
 use tagalong::pipeline::RobotSettings;
-use tagalong::{LogSettings, Pipeline};
+use tagalong::{ConfigSource, LogSettings, Pipeline};
 
 use crate::forecast::ForecastSettings;
 use crate::{BridgeError, ClockSource, ForecastFrame, Middleware};
@@ -20,18 +20,19 @@ use crate::{BridgeError, ClockSource, ForecastFrame, Middleware};
     name = "tagalong-ros2",
     version,
     after_help = "Examples:
-  tagalong-ros2 configs/depth-ekf.toml
+  tagalong-ros2 depth-ekf
         tracks people, moves nothing (the config has no controller)
-  tagalong-ros2 configs/follow-depth.toml --namespace /robot1 --domain 7
+  tagalong-ros2 my-robot.toml --namespace /robot1 --domain 7
         follows somebody; commands go to /robot1/cmd_vel
-  tagalong-ros2 configs/follow-depth.toml --command cmd_vel_nav
+  tagalong-ros2 my-robot.toml --command cmd_vel_nav
         lets another node (a collision monitor, say) pass commands on
 
 Exit codes: 0 ok, 1 failed or a topic is missing, 2 wrong usage or config,
 130 and 143 after SIGINT and SIGTERM."
 )]
 pub struct Options {
-    /// The config of the pipeline.
+    /// The config of the pipeline: a file, or the name of a built-in config (`follow-depth`,
+    /// `robots/turtlebot4`).
     pub config: PathBuf,
     /// ROS domain.
     #[arg(long, env = "ROS_DOMAIN_ID", default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=232))]
@@ -142,6 +143,9 @@ pub struct Options {
         default_missing_value = "follow_object"
     )]
     pub follow_object: Option<String>,
+    /// Check the config, print the distances that follow from it, and end: nothing is published.
+    #[arg(long)]
+    pub check: bool,
     /// Start unconfigured, and wait for a manager to configure and activate the node (lifecycle_msgs).
     /// Otherwise the node activates itself.
     #[arg(long)]
@@ -207,7 +211,7 @@ impl Options {
     pub(crate) fn setup(&self, registry: &Registry) -> Result<Setup, BridgeError> {
         check_security(|name| std::env::var(name).ok())?;
         check_discovery(|name| std::env::var(name).ok())?;
-        let pipeline = Pipeline::builder(registry).from_toml_file(&self.config)?;
+        let pipeline = Pipeline::builder(registry).build(&ConfigSource::open(&self.config)?)?;
         let LogSettings { input, limits, .. } = LogSettings::of(&pipeline)?;
         if self.follow_object.is_some() && !pipeline.has_controller() {
             let words = "--follow-object needs a config with a [controller], whose target Nav2 follows; \
@@ -216,6 +220,22 @@ impl Options {
         }
         let robot = pipeline.config().robot.clone();
         Ok(Setup { pipeline, robot, input: self.named(input), limits })
+    }
+
+    /// Checks the config, and returns what follows from it, in lines.
+    ///
+    /// # Errors
+    /// [`BridgeError::Config`], with file, line and remedy.
+    pub fn checked(&self, registry: &Registry) -> Result<String, BridgeError> {
+        let Setup { pipeline, .. } = self.setup(registry)?;
+        let distances = pipeline.safety_distances().map(|distances| distances.to_string());
+        let mut lines = format!("{}: valid\n", self.config.display());
+        let nothing = "  the config has no controller: no commands\n".to_owned();
+        lines += &distances.unwrap_or(nothing);
+        for caution in pipeline.cautions(None) {
+            lines += &format!("  warning: {caution}\n");
+        }
+        Ok(lines)
     }
 
     pub(crate) fn forecast_settings(&self) -> ForecastSettings {
@@ -285,6 +305,36 @@ mod tests {
                 let words = error.to_string();
                 assert!(words.contains(server) && words.contains("Simple Discovery"), "{words}");
             }
+        }
+    }
+
+    #[test]
+    fn a_built_in_config_is_read_by_its_name_and_an_unknown_one_is_a_wrong_config() {
+        let registry = tagalong::builtin_registry();
+        for (config, topic) in
+            [("follow-depth", None), ("robots/turtlebot4", Some("/oakd/rgb/image_raw"))]
+        {
+            let options: Options = clap::Parser::parse_from(["tagalong-ros2", config]);
+            let setup = options.setup(&registry).map_err(|error| error.to_string());
+            let setup = setup.unwrap_or_else(|error| panic!("{config}: {error}"));
+            assert!(setup.pipeline.has_controller(), "{config}");
+            assert_eq!(setup.input.colour_topic.as_deref(), topic);
+        }
+        let options: Options = clap::Parser::parse_from(["tagalong-ros2", "follow-deep"]);
+        let code = options.setup(&registry).err().map(|error| error.exit_code());
+        assert_eq!(code, Some(2));
+    }
+
+    #[test]
+    fn a_check_tells_the_distances_of_a_config_that_drives() {
+        let registry = tagalong::builtin_registry();
+        for (config, words) in [
+            ("robots/turtlebot4", "at 0.306 m/s it stops within "),
+            ("depth-ekf", "the config has no controller"),
+        ] {
+            let options: Options = clap::Parser::parse_from(["tagalong-ros2", config, "--check"]);
+            let lines = options.checked(&registry).map_err(|error| error.to_string());
+            assert!(lines.as_ref().is_ok_and(|lines| lines.contains(words)), "{lines:?}");
         }
     }
 

@@ -77,6 +77,8 @@ pub(crate) struct BridgeStatus {
     pub(crate) follow: Option<FollowStatus>,
     /// Permission of the deadman's switch to move, in words.
     pub(crate) permission: Option<&'static str>,
+    /// What keeps the robot from being enabled, in words: nobody publishes the enable.
+    pub(crate) note: Option<String>,
     /// Frames that the pipeline processed.
     pub(crate) frames: u64,
     /// Time since the last frame, s; null before the first.
@@ -94,6 +96,9 @@ pub(crate) struct Health {
     pub(crate) ok: bool,
     /// Cause if not.
     pub(crate) reason: Option<String>,
+    /// What keeps the robot from being enabled, in words.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) note: Option<String>,
 }
 
 /// The desk; clones are the same one.
@@ -107,6 +112,7 @@ pub(crate) struct Desk {
 struct Shared {
     follow: Option<FollowStatus>,
     permission: Option<Permission>,
+    note: Option<String>,
     frames: u64,
     frame: Option<Instant>,
     /// End of the last turn of the loop, which takes one frame.
@@ -146,10 +152,17 @@ impl Desk {
         (shared.follow, shared.frames, shared.frame) = (follow, frames, Some(Instant::now()));
     }
 
-    /// Sets the state after a turn of the loop, and after a request.
-    pub(crate) fn turn(&self, permission: Option<Permission>, fault: Option<&'static str>) {
+    /// Sets the state after a turn of the loop, and after a request; `note` says what keeps the robot
+    /// from being enabled.
+    pub(crate) fn turn(
+        &self,
+        permission: Option<Permission>,
+        fault: Option<&'static str>,
+        note: Option<String>,
+    ) {
         let mut shared = self.lock();
         (shared.permission, shared.turn) = (permission, Some(Instant::now()));
+        shared.note = note;
         if let Some(follow) = &mut shared.follow {
             follow.fault = fault;
         }
@@ -184,6 +197,7 @@ impl Desk {
         BridgeStatus {
             follow: shared.follow.clone(),
             permission: shared.permission.map(Permission::cause),
+            note: shared.note.clone(),
             frames: shared.frames,
             frame_age_s: shared.frame.map(|at| at.elapsed().as_secs_f64()),
             lifecycle: shared.lifecycle,
@@ -210,7 +224,7 @@ impl Desk {
             (.., Some(fault)) => Some(format!("fault: {fault}")),
             _ => None,
         };
-        Health { ok: reason.is_none(), reason }
+        Health { ok: reason.is_none(), reason, note: shared.note.clone() }
     }
 
     fn lock(&self) -> MutexGuard<'_, Shared> {
@@ -258,7 +272,7 @@ mod tests {
         let (desk, _requests) = Desk::new();
         desk.open();
         desk.frame(None, 1);
-        desk.turn(Some(Permission::NotEnabled), None);
+        desk.turn(Some(Permission::NotEnabled), None, None);
         desk.close("inactive");
         assert_eq!(desk.ask(Verb::Clear).unwrap_err().reason(), NOT_ACTIVE);
         assert_eq!(desk.health().reason.as_deref(), Some("the node is inactive"));
@@ -270,7 +284,7 @@ mod tests {
         assert_eq!(desk.health().reason.as_deref(), Some("no frame yet"));
         desk.open();
         desk.frame(None, 2);
-        desk.turn(Some(Permission::NotEnabled), None);
+        desk.turn(Some(Permission::NotEnabled), None, None);
         assert!(desk.health().ok);
         desk.set_goal(GoalReport { is_unconfirmed: true, ..GoalReport::default() });
         assert_eq!(desk.health().reason.as_deref(), Some("Nav2 does not confirm that it stops"));
@@ -281,13 +295,18 @@ mod tests {
         let (desk, _requests) = Desk::new();
         assert_eq!(desk.health().reason.as_deref(), Some("no frame yet"));
         desk.frame(None, 1);
-        desk.turn(Some(Permission::NotEnabled), None);
-        assert_eq!(desk.health(), Health { ok: true, reason: None });
+        desk.turn(Some(Permission::NotEnabled), None, None);
+        assert_eq!(desk.health(), Health { ok: true, reason: None, note: None });
         assert_eq!(desk.status().permission, Some("not enabled"));
+        let nobody = Some("nobody publishes people/enable".to_owned());
+        desk.turn(Some(Permission::NotEnabled), None, nobody.clone());
+        assert_eq!(desk.health(), Health { ok: true, reason: None, note: nobody.clone() });
+        assert_eq!(desk.status().note, nobody);
+        desk.turn(Some(Permission::NotEnabled), None, None);
         thread::sleep(STUCK + Duration::from_millis(50));
         assert!(desk.health().reason.unwrap().starts_with("one frame takes 0."), "stuck");
         thread::sleep(SILENCE - STUCK);
-        desk.turn(Some(Permission::NotEnabled), None);
+        desk.turn(Some(Permission::NotEnabled), None, None);
         assert!(desk.health().reason.unwrap().starts_with("no frame for 2."));
     }
 }

@@ -136,6 +136,7 @@ fn two_publishers_of_the_enable_are_a_stop_and_an_old_enable_moves_nothing() {
     sleep(Duration::from_millis(1000));
     assert!(commands.so_far().is_empty(), "an enable from before the bridge");
     drop((kept, other, reset, operator));
+    wait_for(&said, "the publisher of people/enable is gone");
 
     let hand = Hand::new(domain(11), &stop);
     hand.reset_until_heard(&said);

@@ -139,7 +139,10 @@ fn what_is_missing_is_named_and_the_wait_has_an_end() {
             stop.store(true, Ordering::Relaxed);
         })
     };
-    let result = run(&options(domain(2), "1"), &stop, &|_| ());
+    let told = std::sync::Mutex::new(Vec::new());
+    let result = run(&options(domain(2), "1"), &stop, &|words| {
+        told.lock().expect("no test panics with it").push(words.to_owned());
+    });
     has_ended.store(true, Ordering::Relaxed);
     watchdog.join().unwrap();
     let error = result.unwrap_err();
@@ -147,6 +150,9 @@ fn what_is_missing_is_named_and_the_wait_has_an_end() {
     let text = error.to_string();
     assert!(text.starts_with(&format!("`ROS domain {}` has no ", domain(2))), "{text}");
     assert!(text.contains("present:"), "{text}");
+    let told = told.into_inner().expect("no test panics with it");
+    let hint = format!("no topic of another node is on ROS domain {}", domain(2));
+    assert!(told.iter().any(|words| words.starts_with(&hint)), "{told:?}");
 }
 
 /// The deadman's switch on the network: before an enable, while it is repeated, after it ceases,
