@@ -63,10 +63,10 @@ settings! {
         pub people_walk: bool = true,
         /// Distance within which two readings of the laser are of one thing, m.
         #[schemars(range(min = 1e-6, max = 1e6))]
-        pub neighbour_m: f64 = 2.0,
+        pub neighbour_m: f64 = 0.5,
         /// Least number of neighbours of a reading within a thing.
         #[schemars(range(min = 1))]
-        pub neighbours: usize = 6,
+        pub neighbours: usize = 3,
     }
 }
 
