@@ -4,8 +4,8 @@ Usage: python3 benches/robustness.py FOLDER CONFIG... -- LOG.mcap...   (from the
 
 TAGALONG names the program (target/release/tagalong). Each log needs LOG.people.csv beside it; the
 copies and the report are written into FOLDER. `alone` is the log as it is; each other row has one
-alteration of `tagalong alter`. Figures are means over the logs; `worst` is the log that loses most
-MOTA.
+alteration of `tagalong alter`. Figures are means over the logs, and the sum of inherited IDs; `lost` is
+what the mean MOTA loses, and is marked where that is more than 0.03; `worst` is the log that loses most.
 """
 
 import csv
@@ -45,20 +45,35 @@ def mean(values):
     return sum(values) / len(values)
 
 
+# Names in the report of `bench` by titles here.
+FIGURES = {"HOTA": "HOTA", "AssA": "AssA", "MOTA": "MOTA", "IDF1": "IDF1",
+           "inherited": "inherited_ids", "FP/frame": "fp_per_frame", "recall": "recall"}
+# Loss of MOTA beyond which a row is marked.
+MOST_LOST = 0.03
+
+
+def shown(title, values):
+    """The mean of a figure over the logs, or the sum of a count."""
+    return f"{sum(values):.0f}" if title == "inherited" else f"{mean(values):.3f}"
+
+
 def table(rows, alterations, made):
     """The lines of the table of one pipeline."""
-    figures = ["HOTA", "MOTA", "IDF1", "fp_per_frame", "recall"]
     found = {name: {} for name in alterations}
     for row in rows:
         name, log = made[row["log"]]
-        found[name][log] = {figure: float(row[f"image.{figure}"] or "nan") for figure in figures}
-    lines = ["| log | " + " | ".join(figures) + " | worst |", "|---" * (len(figures) + 2) + "|"]
+        found[name][log] = {title: float(row[f"image.{figure}"] or "nan")
+                            for title, figure in FIGURES.items()}
+    lines = ["| log | " + " | ".join(FIGURES) + " | lost | worst |", "|---" * (len(FIGURES) + 3) + "|"]
     for name in alterations:
-        means = [mean([log[figure] for log in found[name].values()]) for figure in figures]
+        of_logs = found[name].values()
+        cells = [name, *(shown(title, [log[title] for log in of_logs]) for title in FIGURES)]
         loss = {log: found["alone"][log]["MOTA"] - of["MOTA"] for log, of in found[name].items()}
         worst = max(loss, key=loss.get)
-        told = "" if name == "alone" else f"{worst} {-loss[worst]:+.3f}"
-        lines.append(f"| {name} | " + " | ".join(f"{value:.3f}" for value in means) + f" | {told} |")
+        lost = mean(list(loss.values()))
+        mark = " **missed**" if lost > MOST_LOST else ""
+        told = ["", ""] if name == "alone" else [f"{lost:.3f}{mark}", f"{worst} {-loss[worst]:+.3f}"]
+        lines.append("| " + " | ".join(cells + told) + " |")
     return lines
 
 
