@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::tuning::{
-    Choice, Figures, Objective, Poll, candidates, leave_one_out, mean, shipped, shown_value,
+    Choice, Figures, Objective, Poll, Search, candidates, leave_one_out, mean, shipped, shown_value,
 };
 use clap::Args;
 use tagalong_app::config_file::ConfigFile;
@@ -102,6 +102,8 @@ struct Contestant {
     settings: Vec<(Vec<toml::Value>, Contender)>,
     /// Number of settings among which the sequences choose.
     candidates: usize,
+    /// Way to find them.
+    search: Search,
     /// Place of the settings of the config, which are a candidate only by chance.
     shipped: usize,
 }
@@ -141,7 +143,8 @@ pub fn boxes(args: &BoxesArgs, registry: &Registry) -> Outcome {
             let with_all = vec![choice.with_all; sequences.len()];
             let tracked = bench.track(contestant, &with_all)?;
             details.push(bench.keep_tracks(format!("{}-with-all", contestant.name), tracked)?);
-            notes.push(format!("{}: {figures} settings tried.", contestant.name));
+            let tried = contestant.search.words(figures, args.seed);
+            notes.push(format!("{}: tried: {tried}.", contestant.name));
             notes.extend(bench.words(contestant, &choice));
         }
     }
@@ -286,7 +289,8 @@ impl Contestant {
             settings.push((now, as_is));
         }
         let shipped = shipped.unwrap_or(settings.len() - 1);
-        Ok(Self { name: file.stem(), tunables, settings, candidates, shipped })
+        let search = Search::of(&tunables, args.budget.into());
+        Ok(Self { name: file.stem(), tunables, settings, candidates, search, shipped })
     }
 
     fn words(&self, setting: usize) -> String {

@@ -43,6 +43,11 @@ pub struct RoomsArgs {
     /// Seed of the sample.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
+    /// Samples, of this seed and of those after it: the tables have the first one, and say how far its
+    /// figures lie from those of the others. Without effect where all combinations are tried.
+    #[arg(long, value_name = "N", default_value_t = 3,
+          value_parser = clap::value_parser!(u8).range(1..=100))]
+    pub samples: u8,
     /// Runs at once; the results are the same.
     #[arg(long, value_name = "N", default_value_t = 1,
           value_parser = clap::value_parser!(u16).range(1..=256))]

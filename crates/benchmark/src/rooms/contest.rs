@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use crate::tuning::{candidates, shipped, shown_value};
+use crate::tuning::{Search, candidates, shipped, shown_value};
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::outcome::Failure;
 use tagalong_config::Registry;
@@ -27,11 +27,15 @@ pub struct Contestant {
     pub config: PlannedConfig,
     /// Settings that run: first those among which the rooms choose.
     pub settings: Vec<Setting>,
-    /// Number of settings among which the rooms choose.
+    /// Number of settings among which the rooms choose, in all samples together.
     pub candidates: usize,
+    /// For each seed its sample: places in `settings`. One, if a seed has no say.
+    pub samples: Vec<Vec<usize>>,
+    /// Way to find them.
+    pub search: Search,
     /// Place of the settings of the config, which are a candidate only by chance.
     pub shipped: usize,
-    /// Number of combinations that contradict themselves.
+    /// Number of combinations of the first sample that contradict themselves.
     pub refused: usize,
 }
 
@@ -66,30 +70,51 @@ impl Contestant {
         config.file.check_tuning(registry)?;
         let (pipeline, _) = config.file.pipeline(registry, None)?;
         let budget = usize::from(args.budget);
+        let search = Search::of(&config.tune, budget);
         let now = shipped(&config.tune);
         let mut settings: Vec<Setting> = Vec::new();
+        let mut samples: Vec<Vec<usize>> = Vec::new();
         let mut refused = 0;
-        for values in candidates(&config.tune, budget, args.seed) {
-            match Setting::new(&config, pipeline.config(), values, locations, registry)? {
-                Some(setting) => settings.push(setting),
-                None => refused += 1,
+        for number in 0..search.samples(args.samples) {
+            let seed = args.seed.wrapping_add(number.into());
+            let mut sample = Vec::new();
+            let mut contradicting = 0;
+            for values in candidates(&config.tune, budget, seed) {
+                let known = settings.iter().position(|setting| setting.values == values);
+                if let Some(known) = known {
+                    sample.push(known);
+                    continue;
+                }
+                match Setting::new(&config, pipeline.config(), values, locations, registry)? {
+                    Some(setting) => {
+                        sample.push(settings.len());
+                        settings.push(setting);
+                    }
+                    None => contradicting += 1,
+                }
             }
+            if number == 0 {
+                refused = contradicting;
+            }
+            samples.push(sample);
         }
-        let candidates = settings.len();
-        if candidates == 0 {
+        if samples[0].is_empty() {
             let name = config.file.stem();
             let why = format!(
                 "{name}: no setting of [tune] is left, all {refused} contradict themselves"
             );
             return Err(Failure::usage(why));
         }
+        // A later sample of nothing but contradictions says nothing of the spread.
+        samples.retain(|sample| !sample.is_empty());
+        let candidates = settings.len();
         let shipped = settings.iter().position(|setting| setting.values == now);
         if shipped.is_none() {
             let as_is = Setting::new(&config, pipeline.config(), now, locations, registry)?;
             settings.extend(as_is);
         }
         let shipped = shipped.unwrap_or(settings.len() - 1);
-        Ok(Self { config, settings, candidates, shipped, refused })
+        Ok(Self { config, settings, candidates, samples, search, shipped, refused })
     }
 
     /// Returns its name in tables.

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use crate::tuning::{
-    Choice, Figures, Objective, Poll, Weights, leave_one_out, mean, shown_value, weighted_mean,
+    Choice, Figures, Objective, Poll, Search, Weights, leave_one_out, mean, shown_value,
+    weighted_mean,
 };
 use serde::Serialize;
 use tagalong_app::outcome::Failure;
@@ -41,6 +42,8 @@ struct About {
 #[derive(Default, Serialize)]
 pub struct Fitted {
     pub name: String,
+    /// Way in which settings were searched.
+    search: Search,
     /// Number of settings among which the rooms chose.
     settings: usize,
     /// Number of settings that contradict themselves, which were not tried.
@@ -50,6 +53,9 @@ pub struct Fitted {
     shipped: Values,
     chosen_with_all: Values,
     pub rooms: Vec<InRoom>,
+    /// Means over the rooms with the settings that each sample chose without them, the first one in
+    /// the tables; one, if a seed has no say.
+    by_sample: Vec<Figures>,
     /// Reason for an empty result.
     #[serde(skip_serializing_if = "Option::is_none")]
     too_few: Option<String>,
@@ -145,10 +151,40 @@ impl Report {
     }
 
     fn tables(&self) -> Vec<Table> {
-        let each = self.pipelines.iter().map(Fitted::table);
+        let each = self.pipelines.iter().map(|fitted| fitted.table(self.seed));
         let beside = differences(&self.pairs).map(|table| [table, by_log(&self.pipelines)]);
         let beside = beside.into_iter().flatten();
         std::iter::once(self.summary()).chain(beside).chain(each).collect()
+    }
+
+    /// Says among which settings the rooms chose.
+    fn searched(&self) -> String {
+        let mut by_grid: Vec<&str> = Vec::new();
+        let mut by_sample: Vec<&str> = Vec::new();
+        for fitted in &self.pipelines {
+            match fitted.search {
+                Search::Shipped => {}
+                Search::Grid => by_grid.push(&fitted.name),
+                Search::Sample { .. } => by_sample.push(&fitted.name),
+            }
+        }
+        let Self { budget, seed, .. } = self;
+        let sample = format!("a sample of at most {budget} (seed {seed}; its luck stands below)");
+        if !by_grid.is_empty() && !by_sample.is_empty() {
+            return format!(
+                "all settings of {} (every setting of the grid was tried) and {sample} of those of {}",
+                by_grid.join(", "),
+                by_sample.join(", ")
+            );
+        }
+        if !by_sample.is_empty() {
+            return format!("{sample} of the settings of a pipeline");
+        }
+        if !by_grid.is_empty() {
+            return "all settings (every setting of the grid was tried, so that no seed has a say)"
+                .to_owned();
+        }
+        "the settings of the config alone".to_owned()
     }
 
     /// Returns the means over the rooms.
@@ -180,10 +216,9 @@ impl Report {
              its person. Another figure of a room is the mean over its logs; rooms.json has all of them."
                 .to_owned(),
             format!(
-                "Chosen by the mean of {objective} over rooms, weighed by people, among at most {} \
-                 settings a pipeline (seed {}); those of the config take part only if the sample \
-                 has them.",
-                self.budget, self.seed
+                "Chosen by the mean of {objective} over rooms, weighed by people, among {}; those of \
+                 the config take part only if they are among these.",
+                self.searched()
             ),
             "Too few rooms for an interval: the next one may differ as much as these do.".to_owned(),
         ];
@@ -262,7 +297,20 @@ impl Scorer<'_> {
         // A model that has seen a room would make any setting look good there.
         let has_say = rooms.iter().map(|(location, _)| !location.single_frames).collect();
         let poll = Poll { weights: Weights::People, has_say };
-        let Choice { without, with_all } = leave_one_out(&unseen, objective, &poll);
+        let singles: Vec<bool> = rooms.iter().map(|(location, _)| location.single_frames).collect();
+        let samples = &self.contestant.samples;
+        let mut choices = Vec::new();
+        let mut by_sample = Vec::new();
+        for sample in samples {
+            let choice = chosen_in(sample, &unseen, objective, &poll);
+            let mut figures = Vec::new();
+            for (room, at) in choice.without.iter().enumerate() {
+                figures.push((singles[room], &unseen[*at][room]));
+            }
+            by_sample.push(mean_over_rooms(&figures, Weights::People));
+            choices.push(choice);
+        }
+        let Choice { without, with_all } = choices.swap_remove(0);
         let mut in_rooms = Vec::new();
         for (at, (location, logs)) in rooms.iter().enumerate() {
             in_rooms.push(InRoom {
@@ -277,12 +325,14 @@ impl Scorer<'_> {
         }
         Ok(Fitted {
             name: self.contestant.name(),
-            settings: self.contestant.candidates,
+            search: self.contestant.search,
+            settings: samples[0].len(),
             refused: self.contestant.refused,
             skipped,
             shipped: self.values(self.contestant.shipped),
             chosen_with_all: self.values(with_all),
             rooms: in_rooms,
+            by_sample,
             too_few,
         })
     }
@@ -332,6 +382,27 @@ impl Scorer<'_> {
     }
 }
 
+/// Returns the choice among the settings of a sample. `figures` has those of all settings.
+fn chosen_in(
+    sample: &[usize],
+    figures: &[Vec<Figures>],
+    objective: Objective,
+    poll: &Poll,
+) -> Choice {
+    let of_sample: Vec<Vec<Figures>> = sample.iter().map(|at| figures[*at].clone()).collect();
+    let Choice { without, with_all } = leave_one_out(&of_sample, objective, poll);
+    Choice {
+        without: without.into_iter().map(|at| sample[at]).collect(),
+        with_all: sample[with_all],
+    }
+}
+
+/// Returns the least and the largest value of a figure.
+fn ends(figures: &[Figures], read: fn(&Figures) -> f64) -> [f64; 2] {
+    let values = figures.iter().map(read);
+    [values.clone().fold(f64::INFINITY, f64::min), values.fold(f64::NEG_INFINITY, f64::max)]
+}
+
 /// Returns the mean of figures over rooms; those of tracking are of rooms that are not single frames.
 fn over_rooms(rooms: &[InRoom], read: fn(&InRoom) -> &Figures, weights: Weights) -> Figures {
     let all: Vec<(bool, &Figures)> =
@@ -373,7 +444,7 @@ impl Fitted {
         [cells(&mean), vec![Cell::number(alike.without.hota, 3)]].concat()
     }
 
-    fn table(&self) -> Table {
+    fn table(&self, seed: u64) -> Table {
         let means = if self.rooms.is_empty() { Vec::new() } else { Vec::from(self.means()) };
         let rows = self.rooms.iter().chain(&means);
         Table {
@@ -382,18 +453,19 @@ impl Fitted {
             rows: rows
                 .map(|room| Row::ours(labelled(&room.room, room.single_frames), cells(room)))
                 .collect(),
-            notes: self.notes(),
+            notes: self.notes(seed),
         }
     }
 
-    fn notes(&self) -> Vec<String> {
+    fn notes(&self, seed: u64) -> Vec<String> {
+        let tried = self.search.words(self.settings, seed);
         let mut notes = vec![match self.refused {
-            0 => format!("Tried: {} settings.", self.settings),
-            refused => format!(
-                "Tried: {} settings; {refused} contradict themselves and were left out.",
-                self.settings
-            ),
+            0 => format!("Tried: {tried}."),
+            refused => {
+                format!("Tried: {tried}; {refused} contradict themselves and were left out.")
+            }
         }];
+        notes.extend(self.spread(seed));
         notes.extend(self.too_few.as_ref().map(|why| format!("Nothing to say: it {why}.")));
         let mut chosen: BTreeMap<String, Vec<&str>> = BTreeMap::new();
         for InRoom { room, chosen_without, .. } in &self.rooms {
@@ -408,6 +480,25 @@ impl Fitted {
         notes.extend(without);
         notes.extend(self.skipped.iter().map(|s| format!("Not read: {}: {}.", s.log, s.why)));
         notes
+    }
+
+    /// Says how far the samples of several seeds lie apart, if there are several.
+    fn spread(&self, seed: u64) -> Option<String> {
+        if self.by_sample.len() < 2 || self.rooms.is_empty() {
+            return None;
+        }
+        let last = seed + self.by_sample.len() as u64 - 1;
+        let figures: [(&str, fn(&Figures) -> f64); 3] =
+            [("HOTA", |f| f.hota), ("IDF1", |f| f.idf1), ("MOTA", |f| f.mota)];
+        let words = figures.map(|(title, read)| {
+            let [least, most] = ends(&self.by_sample, read);
+            format!("{title} {least:.3} to {most:.3}")
+        });
+        Some(format!(
+            "Spread of the mean w/o over samples (seeds {seed} to {last}): {}. Smaller differences \
+             to another pipeline say nothing.",
+            words.join(", ")
+        ))
     }
 
     /// Formats the values that differ from those of the config.
@@ -521,8 +612,37 @@ mod tests {
     }
 
     #[test]
+    fn a_sample_chooses_among_its_own_settings() {
+        let figures: Vec<Vec<Figures>> = [0.1, 0.5, 0.9, 0.7]
+            .map(|hota| vec![Figures { hota, people: 1, ..Figures::default() }; 2])
+            .to_vec();
+        let poll = Poll::of_equals(2);
+        for (sample, best) in [(&[0, 1][..], 1), (&[3, 1], 3), (&[0, 1, 2, 3], 2)] {
+            let choice = chosen_in(sample, &figures, Objective::Hota, &poll);
+            assert_eq!(choice, Choice { without: vec![best; 2], with_all: best }, "{sample:?}");
+        }
+    }
+
+    #[test]
+    fn the_spread_over_samples_is_told_and_a_whole_grid_has_none() {
+        let by_sample = [0.61, 0.58, 0.6].map(|hota| Figures { hota, ..Figures::default() });
+        let search = Search::Sample { of: 243 };
+        let sampled = Fitted { search, by_sample: by_sample.to_vec(), ..three_rooms() };
+        let notes = sampled.notes(4).join(" ");
+        assert!(
+            notes.contains("a sample of 1 of the 243 settings of the grid (seed 4)"),
+            "{notes}"
+        );
+        assert!(notes.contains("(seeds 4 to 6): HOTA 0.580 to 0.610, IDF1 0.000"), "{notes}");
+        let whole = Fitted { search: Search::Grid, ..three_rooms() };
+        let notes = whole.notes(4).join(" ");
+        assert!(notes.contains("every setting of the grid, 1 in all"), "{notes}");
+        assert!(!notes.contains("seeds"), "{notes}");
+    }
+
+    #[test]
     fn the_table_has_the_row_of_single_frames_and_both_means() {
-        let table = three_rooms().table();
+        let table = three_rooms().table(1);
         let names: Vec<&str> = table.rows.iter().map(|row| row.name.as_str()).collect();
         assert_eq!(names, ["A", "B", "D, single frames", "mean", "mean, rooms alike"]);
         let last = three_rooms().mean_cells().pop().and_then(|cell| cell.value).unwrap();

@@ -1,5 +1,6 @@
 use std::collections::BTreeSet;
 
+use serde::Serialize;
 use tagalong_math::{ChaCha, RandomSource};
 use tagalong_pipeline::Tunable;
 
@@ -12,6 +13,56 @@ const ROUNDS: usize = 64;
 /// Returns the settings of the config.
 pub fn shipped(tunables: &[Tunable]) -> Candidate {
     tunables.iter().map(|tunable| tunable.now.clone()).collect()
+}
+
+/// Ways to search settings.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case", tag = "tried")]
+pub enum Search {
+    /// Those of the config alone.
+    #[default]
+    Shipped,
+    /// All combinations: no seed has a say.
+    Grid,
+    /// A sample of the combinations, which depends on a seed.
+    Sample {
+        /// Number of all combinations.
+        of: usize,
+    },
+}
+
+impl Search {
+    /// Returns the way in which [`candidates`] searches.
+    pub fn of(tunables: &[Tunable], budget: usize) -> Self {
+        let sizes = tunables.iter().map(|tunable| tunable.values.len());
+        let of = sizes.fold(1_usize, usize::saturating_mul);
+        match budget {
+            0 | 1 => Self::Shipped,
+            _ if of <= budget => Self::Grid,
+            _ => Self::Sample { of },
+        }
+    }
+
+    /// Returns the number of different samples, of so many seeds.
+    pub fn samples(self, wanted: u8) -> u8 {
+        match self {
+            Self::Shipped | Self::Grid => 1,
+            Self::Sample { .. } => wanted,
+        }
+    }
+
+    /// Says which settings were tried, `tried` in all.
+    pub fn words(self, tried: usize, seed: u64) -> String {
+        match self {
+            Self::Shipped => "the settings of the config alone".to_owned(),
+            Self::Grid => {
+                format!("every setting of the grid, {tried} in all, so that no seed has a say")
+            }
+            Self::Sample { of } => {
+                format!("a sample of {tried} of the {of} settings of the grid (seed {seed})")
+            }
+        }
+    }
 }
 
 /// Returns the settings to be tried, at most `budget`. All combinations where they are few enough;
@@ -147,6 +198,27 @@ mod tests {
                 let count = all.iter().filter(|c| c[setting] == Value::Integer(value)).count();
                 assert!((3..=7).contains(&count), "{setting} is {value} in {count} of 20");
             }
+        }
+    }
+
+    #[test]
+    fn the_search_is_named_as_it_is_done() {
+        for (budget, expected, words) in [
+            (1, Search::Shipped, "the settings of the config alone"),
+            (64, Search::Grid, "every setting of the grid, 64 in all, so that no seed has a say"),
+            (
+                63,
+                Search::Sample { of: 64 },
+                "a sample of 63 of the 64 settings of the grid (seed 5)",
+            ),
+        ] {
+            let search = Search::of(&three(), budget);
+            assert_eq!(search, expected, "{budget}");
+            let tried = candidates(&three(), budget, 5);
+            assert_eq!(search.words(tried.len(), 5), words);
+            let other = candidates(&three(), budget, 6);
+            let depends = matches!(search, Search::Sample { .. });
+            assert_eq!(tried != other, depends, "{budget}");
         }
     }
 

@@ -9,6 +9,6 @@ mod candidates;
 mod choice;
 mod rooms;
 
-pub use candidates::{candidates, shipped, shown_value};
+pub use candidates::{Search, candidates, shipped, shown_value};
 pub use choice::{Choice, Figures, Objective, Poll, Weights, leave_one_out, mean, weighted_mean};
 pub use rooms::Rooms;

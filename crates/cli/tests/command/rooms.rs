@@ -164,6 +164,37 @@ fn tables_name_figures_and_choices() {
 }
 
 #[test]
+fn a_search_says_whether_a_seed_has_a_say() {
+    let home = Home::new();
+    let whole = text(&home.rooms(&[]).stdout);
+    assert!(whole.contains("every setting of the grid was tried, so that no seed"), "{whole}");
+    assert!(whole.contains("Tried: every setting of the grid, 2 in all"), "{whole}");
+    assert!(!whole.contains("Spread of"), "{whole}");
+    home.config("near", TUNE, &VALUES.replace("[2.0, 4.0]", "[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]"));
+    let sampled = text(&home.rooms(&["--budget", "2", "--seed", "7", "--samples", "4"]).stdout);
+    for words in [
+        "a sample of at most 2 (seed 7; its luck stands below)",
+        "Tried: a sample of 2 of the 6 settings of the grid (seed 7).",
+        "Spread of the mean w/o over samples (seeds 7 to 10): HOTA ",
+    ] {
+        assert!(sampled.contains(words), "{words} in {sampled}");
+    }
+    let one = text(&home.rooms(&["--budget", "2", "--seed", "7", "--samples", "1"]).stdout);
+    assert!(!one.contains("Spread of"), "{one}");
+    let fitted = home.fitted(&["--budget", "2", "--seed", "7", "--samples", "4"]);
+    let by_sample = fitted["by_sample"].as_array().unwrap();
+    assert_eq!(by_sample.len(), 4);
+    let first = (mota(&fitted, 0, "without"), mota(&fitted, 1, "without"));
+    let people = [0, 1].map(|room| {
+        let people = &fitted["rooms"][room]["without"]["people"];
+        people.as_f64().unwrap()
+    });
+    let mean = (first.0 * people[0] + first.1 * people[1]) / (people[0] + people[1]);
+    let told = by_sample[0]["MOTA"].as_f64().unwrap();
+    assert!((told - mean).abs() < 1e-9, "{told} instead of {mean}");
+}
+
+#[test]
 fn named_pipelines_are_compared_with_the_last_one_room_by_room_and_log_by_log() {
     let home = Home::new();
     home.config("far", "config = { max_depth_m = 4.0 }", "manager.config.confirm_hits = [2]");
