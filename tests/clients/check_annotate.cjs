@@ -27,7 +27,7 @@ const readRows = () => {
   if (!existsSync(file)) return [];
   const [header, ...lines] = readFileSync(file, "utf8").trim().split("\n");
   const names = header.split(",");
-  return lines.map((line) => Object.fromEntries(line.split(",").map((cell, i) => [names[i], i === 14 ? cell : Number(cell)])));
+  return lines.map((line) => Object.fromEntries(line.split(",").map((cell, i) => [names[i], i === 14 || i === 18 ? cell : Number(cell)])));
 };
 const rowsOf = (id) => readRows().filter((row) => row.id === id);
 const rowAt = (id, frame) => rowsOf(id).find((row) => row.frame === frame);
@@ -141,6 +141,31 @@ const checkNewPerson = async (page, index) => {
   assert.equal(rowsOf(9).length, 4, "deleted from here on");
 };
 
+// A person behind another one gets a box inside the box of that one.
+const checkBehind = async (page) => {
+  const before = await shownPeople(page);
+  const { x, y } = await onScreen(page, before[0]);
+  await page.keyboard.down("Control");
+  await change(page, () => page.mouse.click(x, y));
+  await page.keyboard.up("Control");
+  assert.equal((await shownPeople(page)).length, before.length + 1, "Ctrl and a click add a person in a box");
+  await press(page, "Control+z");
+  await page.click("#add");
+  await change(page, () => page.mouse.click(x, y));
+  assert.equal((await shownPeople(page)).length, before.length + 1, "the next click adds a person");
+  await press(page, "Control+z");
+};
+
+// Proposed boxes are marked in the file until somebody says that they are right.
+const checkReview = async (page) => {
+  const frame = await frameNow(page);
+  const open = () => readRows().filter((row) => row.frame === frame && row.proposed).length;
+  assert.ok(open() > 0 && (await page.textContent("#open")).includes("Nobody reviewed"), "the boxes are proposed");
+  await press(page, "r");
+  assert.equal(open(), 0, "they are reviewed");
+  assert.notEqual(await frameNow(page), frame, "the next frame is shown");
+};
+
 const checkKill = async (page, child) => {
   const before = readFileSync(file, "utf8");
   child.kill("SIGKILL");
@@ -197,6 +222,9 @@ const main = async () => {
   await page.waitForSelector("#number:not(:empty)");
   const index = await findBusyFrame(page);
   await checkMoving(page);
+  await checkBehind(page);
+  await checkReview(page);
+  await goTo(page, index);
   await checkNewPerson(page, index);
   assert.deepEqual(problems, [], `errors of the page: ${problems.join("; ")}`);
   await checkKill(page, first.child);

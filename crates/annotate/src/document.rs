@@ -57,6 +57,8 @@ pub enum Change {
     Unpin { frame: u32, id: i64 },
     /// Fills the pause around a frame.
     Fill { frame: u32, id: i64 },
+    /// Says that all boxes of a frame are right.
+    Review { frame: u32 },
     /// Notes on the box of a person.
     Note { frame: u32, id: i64, ignore: Option<bool>, visible: Option<f64> },
     /// Takes the last change back.
@@ -162,6 +164,7 @@ impl Document {
             Change::Pin { id, frame } | Change::Unpin { id, frame } => {
                 self.person_in_frame(*id, *frame)
             }
+            Change::Review { frame } => Ok(self.people_in_frame(*frame)),
             Change::Note { id, frame, visible, .. } => {
                 if visible.is_some_and(|visible| !(0.0..=1.0).contains(&visible)) {
                     return Err("the visible part is a fraction, 0 to 1".into());
@@ -188,6 +191,12 @@ impl Document {
         }
     }
 
+    /// Returns the people in a frame.
+    fn people_in_frame(&self, frame: u32) -> Vec<i64> {
+        let people = self.people.iter().filter(|(_, person)| person.at(frame).is_some());
+        people.map(|(id, _)| *id).collect()
+    }
+
     /// Makes a change that was checked.
     fn perform(&mut self, change: &Change) {
         match *change {
@@ -203,10 +212,11 @@ impl Document {
             Change::Delete { frame, id, scope } => {
                 self.on(id, |person| person.remove(scope.frames(frame)));
             }
-            Change::Pin { frame, id } => {
-                self.on(id, |person| {
-                    person.pin(frame);
-                });
+            Change::Pin { frame, id } => self.on(id, |person| person.review(frame)),
+            Change::Review { frame } => {
+                for id in self.people_in_frame(frame) {
+                    self.on(id, |person| person.review(frame));
+                }
             }
             Change::Unpin { frame, id } => self.on(id, |person| person.unpin(frame)),
             Change::Fill { frame, id } => self.on(id, |person| person.fill(frame)),
@@ -216,6 +226,7 @@ impl Document {
                     key.visible = visible.unwrap_or(key.visible);
                     key.interpolated =
                         if person.key(frame).is_some() { key.interpolated } else { 0 };
+                    key.proposed.clear();
                     person.set(frame, key);
                 }
             }),
@@ -311,6 +322,7 @@ mod tests {
             Change::Fill { frame: 3, id: 7 },
             Change::Pin { frame: 7, id: 7 },
             Change::Note { frame: 6, id: 7, ignore: Some(true), visible: Some(0.25) },
+            Change::Review { frame: 5 },
             Change::Unpin { frame: 6, id: 7 },
             Change::Delete { frame: 3, id: 7, scope: Scope::All },
         ];

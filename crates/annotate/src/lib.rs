@@ -45,6 +45,7 @@ use tagalong_app::suggest::check_log_path;
 use tagalong_config::Registry;
 use tagalong_eval::Region;
 use tagalong_log::{FrameSource, Input, Inputs, LogFrame};
+use tagalong_math::counted;
 use tagalong_pipeline::{FrameReport, Pipeline};
 use tagalong_render::background;
 use tagalong_serve::{Access, Changes, Server};
@@ -82,7 +83,8 @@ pub struct AnnotateArgs {
 /// Examples for `tagalong annotate --help`.
 pub const HELP: &str = "\
 Opens a page for your browser on this computer; nothing leaves it. A pipeline proposes tracks, unless the
-file exists: then that is continued. Click a head or drag a box; a digit is the ID of the person;
+file exists: then that is continued; to compare pipelines begin with --empty, or review every frame
+(R): truth that a pipeline proposed favours it. Click a head or drag a box; a digit is the ID of the person;
 between two boxes that were set the others are interpolated; depth fills in the places. The file is
 written whole after every change, so a kill loses nothing. `Finish` in the page ends with exit code 0,
 Ctrl-C with 130; the file is whole in both cases. `eval`, `bench` and `view` find it beside the log.
@@ -224,13 +226,15 @@ impl Material {
             pass.take(&item, report.map_err(Failure::failed)?.as_ref())?;
             progress.advance(source.progress(), item.frame.index);
         }
-        let origin = match &proposing {
-            Some(config) => format!("the boxes are proposed by {}", config.stem()),
-            None => "no boxes are proposed".to_owned(),
-        };
+        let proposer = proposing.as_ref().map(ConfigFile::stem).unwrap_or_default();
         let Pass { film, tracks, .. } = pass;
         check_images(&args.log, &film)?;
-        let people = proposals(&film, tracks);
+        let short = tracks.values().filter(|boxes| boxes.len() < LEAST_DETECTIONS).count();
+        let people = proposals(&film, tracks, &proposer);
+        let origin = match &proposing {
+            Some(_) => format!("the boxes are proposed by {proposer}{}", hidden(short)),
+            None => "no boxes are proposed".to_owned(),
+        };
         Ok(Self { film, people, origin })
     }
 }
@@ -292,22 +296,31 @@ fn no_room(error: std::io::Error) -> Failure {
     ))
 }
 
+/// Says how many tracks are too short to be proposed.
+fn hidden(short: usize) -> String {
+    if short == 0 {
+        return String::new();
+    }
+    format!(", without {} of fewer than {LEAST_DETECTIONS} detections", counted(short, "track"))
+}
+
 /// Returns people with few keys from the boxes of tracks, numbered from 1 in the order in which they
 /// come.
-fn proposals(film: &Film, tracks: Boxes) -> BTreeMap<i64, Person> {
+fn proposals(film: &Film, tracks: Boxes, proposer: &str) -> BTreeMap<i64, Person> {
     let mut tracks: Vec<_> = tracks.into_values().collect();
     tracks.retain(|boxes| boxes.len() >= LEAST_DETECTIONS);
     tracks.sort_by_key(|boxes| boxes[0].0);
-    (1..).zip(tracks.iter().map(|boxes| proposal(film, boxes))).collect()
+    (1..).zip(tracks.iter().map(|boxes| proposal(film, boxes, proposer))).collect()
 }
 
-fn proposal(film: &Film, boxes: &[(u32, Region)]) -> Person {
+fn proposal(film: &Film, boxes: &[(u32, Region)], proposer: &str) -> Person {
     let mut keys = BTreeMap::new();
     let mut shown = BTreeSet::new();
     for part in boxes.chunk_by(|a, b| time_of(film, b.0) - time_of(film, a.0) <= BRIDGED_S) {
         keys.extend(sparse(part));
         shown.extend(part[0].0..=part[part.len() - 1].0);
     }
+    keys.values_mut().for_each(|key| proposer.clone_into(&mut key.proposed));
     Person::of(keys, &shown)
 }
 
@@ -330,13 +343,16 @@ mod tests {
                 tracks.entry(id).or_default().push((*frame, region));
             }
         }
-        let people = proposals(&film, tracks);
+        let people = proposals(&film, tracks, "net");
         assert_eq!(people.keys().copied().collect::<Vec<_>>(), [1, 2], "too short is left out");
         assert_eq!(people[&1].frames().collect::<Vec<_>>(), [1, 2, 3, 4]);
         let frames: Vec<u32> = people[&2].frames().collect();
         assert_eq!(frames, [3, 4, 5, 6, 7, 8, 9, 10, 30, 31]);
         assert_eq!(people[&2].at(7).unwrap().region.x, 7.0);
         assert!(people[&2].key(7).is_none());
+        assert_eq!(people[&2].at(7).expect("a box").proposed, "net");
+        assert_eq!(hidden(1), ", without 1 track of fewer than 3 detections");
+        assert_eq!(hidden(0), "");
     }
 
     #[test]

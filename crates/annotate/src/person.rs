@@ -24,6 +24,8 @@ pub struct Key {
     pub head_in_camera_m: Option<[f64; 3]>,
     /// Origin of that place, as the file has it.
     pub interpolated: u8,
+    /// Pipeline that proposed the box, until somebody reviews it; empty then, and for boxes set by hand.
+    pub proposed: String,
 }
 
 impl Key {
@@ -37,6 +39,7 @@ impl Key {
             visible_body: None,
             head_in_camera_m: None,
             interpolated: 0,
+            proposed: String::new(),
         }
     }
 
@@ -46,6 +49,7 @@ impl Key {
         self.visible_body = None;
         self.head_in_camera_m = None;
         self.interpolated = 0;
+        self.proposed.clear();
     }
 }
 
@@ -115,7 +119,11 @@ impl Person {
         let share = f64::from(frame - before) / f64::from(after - before);
         let region = between(&old.region, &new.region, share);
         // The notes hold until the next key changes them.
-        let notes = Key { visible_body: None, head_in_camera_m: None, ..old.clone() };
+        let mut notes = Key { visible_body: None, head_in_camera_m: None, ..old.clone() };
+        // What lies between two keys is reviewed if both of them are.
+        if notes.proposed.is_empty() {
+            notes.proposed.clone_from(&new.proposed);
+        }
         Some(Key { region, interpolated: 1, ..notes })
     }
 
@@ -143,6 +151,15 @@ impl Person {
             place.insert(key);
         }
         true
+    }
+
+    /// Makes a reviewed key of the box of a frame.
+    pub fn review(&mut self, frame: u32) {
+        if self.pin(frame)
+            && let Some(key) = self.keys.get_mut(&frame)
+        {
+            key.proposed.clear();
+        }
     }
 
     /// Takes a key back, so that the box is interpolated; at an end the person begins later or ends
@@ -292,6 +309,28 @@ mod tests {
         assert_eq!(person.at(4).unwrap().interpolated, 1);
         assert_eq!((person.at(1), person.at(7)), (None, None));
         assert!(person.key(4).is_none() && person.key(2).is_some());
+    }
+
+    #[test]
+    fn a_proposed_box_is_reviewed_alone_and_what_lies_between_with_both_ends() {
+        fn proposed(person: &Person) -> Vec<u32> {
+            let frames = person.frames();
+            frames.filter(|f| person.at(*f).is_some_and(|key| !key.proposed.is_empty())).collect()
+        }
+
+        let mut person = Person::default();
+        for (frame, x) in [(1, 0.0), (5, 40.0)] {
+            person.set(frame, Key { proposed: "net".into(), ..Key::new(square(x)) });
+        }
+        assert_eq!(proposed(&person), [1, 2, 3, 4, 5]);
+        person.review(3);
+        assert_eq!(proposed(&person), [1, 2, 4, 5]);
+        person.review(1);
+        assert_eq!(proposed(&person), [4, 5], "both ends of frame 2 are reviewed");
+        let mut moved = person.key(5).expect("a key").clone();
+        moved.move_to(square(41.0));
+        person.set(5, moved);
+        assert!(proposed(&person).is_empty());
     }
 
     #[test]

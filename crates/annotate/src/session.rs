@@ -18,8 +18,8 @@ use crate::film::{Film, Place};
 use crate::person::{Key, Person, tenths};
 
 /// A person in a frame, as the page takes it: frame, box, then 1 for a key, 1 for ignored, the
-/// visible fraction, and the distance, m, or null.
-type PageRow = (u32, [f64; 4], u8, u8, f64, Option<f64>);
+/// visible fraction, the distance, m, or null, and 1 for a proposed box that nobody reviewed.
+type PageRow = (u32, [f64; 4], u8, u8, f64, Option<f64>, u8);
 
 /// Answer to a change, and the state at the beginning.
 #[derive(Debug, Serialize)]
@@ -151,6 +151,7 @@ impl Session {
             | Change::Pin { frame, .. }
             | Change::Unpin { frame, .. }
             | Change::Fill { frame, .. }
+            | Change::Review { frame }
             | Change::Note { frame, .. } => *frame,
         };
         if self.film.shot(frame).is_none() {
@@ -193,7 +194,8 @@ impl Session {
             let distance = head.map(|(head, _)| head.iter().map(|v| v * v).sum::<f64>().sqrt());
             let distance = distance.map(|m| (m * 100.0).round() / 100.0);
             let is_key = u8::from(person.key(number).is_some());
-            Some((number, box_px, is_key, u8::from(key.ignore), key.visible, distance))
+            let proposed = u8::from(!key.proposed.is_empty());
+            Some((number, box_px, is_key, u8::from(key.ignore), key.visible, distance, proposed))
         });
         Some(rows.collect::<Vec<_>>())
     }
@@ -249,6 +251,7 @@ impl Session {
             ignore: found.ignore,
             interpolated: if is_key { measured } else { 1 },
             key: is_key,
+            proposed: found.proposed,
         })
     }
 
@@ -393,6 +396,7 @@ fn key_of(row: Row, film: &Film) -> Option<Key> {
         visible_body: row.visible_body,
         head_in_camera_m: row.head_in_camera_m,
         interpolated: row.interpolated,
+        proposed: row.proposed,
     })
 }
 
@@ -502,7 +506,7 @@ mod tests {
         let mut session = Session::new(Arc::new(film(12)), people, path.clone());
         session.apply(&head(1, None, 150.0)).unwrap();
         let new = fs::read_to_string(&path).unwrap();
-        let wanted: Vec<String> = old.lines().skip(1).map(|line| format!("{line},1")).collect();
+        let wanted: Vec<String> = old.lines().skip(1).map(|line| format!("{line},1,")).collect();
         assert_eq!(new.lines().skip(2).collect::<Vec<_>>(), wanted, "{new}");
     }
 

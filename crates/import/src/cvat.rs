@@ -209,6 +209,7 @@ fn row(
         ignore: ignored || labelled.attribute("label") == Some("ignore"),
         interpolated: 1,
         key,
+        proposed: String::new(),
     })
 }
 

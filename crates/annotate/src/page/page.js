@@ -9,7 +9,7 @@ const CLICK_PX = 4;
 const VISIBLE = [1, 0.75, 0.5, 0.25, 0];
 const byId = (id) => document.getElementById(id);
 
-// People by number, each a map from frame to { box, key, ignore, visible, distance }.
+// People by number, each a map from frame to { box, key, ignore, visible, distance, proposed }.
 const people = new Map();
 let about = null;
 let at = 0;
@@ -19,6 +19,8 @@ let drag = null;
 let able = { undo: false, redo: false, saved: false };
 let queue = Promise.resolve();
 let finished = false;
+// The next click adds a person, also where a box of another one is.
+let adding = false;
 
 const frame = () => about.frames[at];
 const colour = (id) => STYLE.getPropertyValue(`--t${((id % 20) + 20) % 20}`);
@@ -37,8 +39,8 @@ const take = (answer) => {
   for (const [id, rows] of Object.entries(answer.people)) {
     if (!rows) people.delete(Number(id));
     else {
-      const read = ([number, box, key, ignore, visible, distance]) =>
-        [number, { box, key: key === 1, ignore: ignore === 1, visible, distance }];
+      const read = ([number, box, key, ignore, visible, distance, proposed]) =>
+        [number, { box, key: key === 1, ignore: ignore === 1, visible, distance, proposed: proposed === 1 }];
       people.set(Number(id), new Map(rows.map(read)));
     }
   }
@@ -76,6 +78,20 @@ const change = (data) => {
   return queue;
 };
 
+// The proposed boxes that nobody reviewed.
+const unreviewed = () => {
+  const frames = new Set();
+  let boxes = 0;
+  for (const rows of people.values()) {
+    for (const [number, row] of rows) {
+      if (!row.proposed) continue;
+      frames.add(number);
+      boxes += 1;
+    }
+  }
+  return { boxes, frames: frames.size };
+};
+
 // ---- what is seen ----
 
 const show = () => {
@@ -85,6 +101,10 @@ const show = () => {
   byId("frame").setAttribute("aria-valuetext", `frame ${frame()}`);
   byId("undo").disabled = !able.undo;
   byId("redo").disabled = !able.redo;
+  byId("add").setAttribute("aria-pressed", String(adding));
+  const open = unreviewed();
+  byId("review").disabled = !here().some((id) => rowOf(id).proposed);
+  byId("open").textContent = open.boxes ? `Nobody reviewed ${open.boxes} proposed boxes in ${open.frames} frames.` : "";
   byId("saved").textContent = able.saved ? `All is saved in ${about.file}.` : `Not saved yet: ${about.file}`;
   showImage();
   showBoxes();
@@ -154,7 +174,7 @@ const showPeople = () => {
     button.dataset.id = id;
     button.style.setProperty("--c", colour(id));
     button.setAttribute("aria-pressed", String(id === chosen));
-    const notes = [row.key ? "set" : "interpolated", row.distance ? `${row.distance.toFixed(2)} m` : "no depth"];
+    const notes = [row.proposed ? "proposed" : row.key ? "set" : "interpolated", row.distance ? `${row.distance.toFixed(2)} m` : "no depth"];
     if (row.visible < 1) notes.push(`${100 * row.visible} % visible`);
     if (row.ignore) notes.push("ignored");
     button.textContent = `${id}: ${notes.join(", ")}`;
@@ -172,7 +192,11 @@ const showPeople = () => {
   if (document.activeElement !== byId("to")) byId("to").value = chosen ?? 1;
   byId("ignore").checked = Boolean(row?.ignore);
   byId("visible").value = String(VISIBLE.reduce((best, v) => (Math.abs(v - (row?.visible ?? 1)) < Math.abs(best - (row?.visible ?? 1)) ? v : best), 1));
-  byId("hint").textContent = chosen === null ? "A click on a head adds a person." : `A click on a head places person ${chosen}; Esc, then a click, adds another person.`;
+  byId("hint").textContent = adding
+    ? "The next click on a head adds a person, also inside the box of another one."
+    : chosen === null
+      ? "A click on a head adds a person; with Ctrl also inside the box of another one."
+      : `A click on a head places person ${chosen}, with Shift also inside another box; Ctrl and a click adds another person.`;
 };
 
 const showStrips = () => {
@@ -265,6 +289,14 @@ const nextKey = (step) => {
     if (rows.get(about.frames[index])?.key) return go(index);
   }
 };
+const review = () => {
+  if (here().some((id) => rowOf(id).proposed)) change({ op: "review", frame: frame() });
+  go(at + 1);
+};
+const add = () => {
+  adding = !adding;
+  show();
+};
 const nextPerson = () => {
   const ids = here();
   if (ids.length) choose(ids[(ids.indexOf(chosen) + 1) % ids.length]);
@@ -286,11 +318,14 @@ const startDrag = (event) => {
   play(false);
   const from = pixel(event);
   const { corner, id } = event.target.dataset;
-  if (corner) drag = { kind: "size", id: chosen, corner, old: rowOf(chosen).box };
+  const isNew = adding || event.ctrlKey || event.metaKey;
+  // With a key the boxes under the pointer do not count: people stand behind each other.
+  if (isNew || event.shiftKey) drag = { kind: "new", id: null, old: null, isNew };
+  else if (corner) drag = { kind: "size", id: chosen, corner, old: rowOf(chosen).box };
   else if (id) {
     drag = { kind: "move", id: Number(id), old: rowOf(Number(id)).box };
     if (chosen !== drag.id) choose(drag.id);
-  } else drag = { kind: "new", id: null, old: null };
+  } else drag = { kind: "new", id: null, old: null, isNew };
   Object.assign(drag, { from, client: [event.clientX, event.clientY], box: null });
   byId("boxes").setPointerCapture(event.pointerId);
   event.preventDefault();
@@ -320,14 +355,16 @@ const moveDrag = (event) => {
 
 const endDrag = (event) => {
   if (!drag) return;
-  const { kind, id, box } = drag;
+  const { kind, id, box, isNew } = drag;
+  adding = false;
+  const owner = isNew ? null : chosen;
   const number = frame();
   const tenth = (v) => Math.round(10 * v) / 10;
   if (kind === "new" && !box) {
-    change({ op: "head", frame: number, id: chosen, at: pixel(event) }).finally(() => show());
+    change({ op: "head", frame: number, id: owner, at: pixel(event) }).finally(() => show());
   } else if (box) {
     // A drawn box is that of the chosen person unless that one is in the frame already.
-    const of = kind === "new" ? (chosen !== null && !rowOf(chosen) ? chosen : null) : id;
+    const of = kind === "new" ? (owner !== null && !rowOf(owner) ? owner : null) : id;
     const row = of === null ? null : rowOf(of);
     if (row) row.box = box;
     change({ op: "box", frame: number, id: of, region: box.map(tenth) });
@@ -342,19 +379,19 @@ const KEYS = {
   Home: () => go(0),
   End: () => go(about.frames.length - 1),
   " ": () => play(playing === null),
-  Escape: () => { drag = null; choose(null); },
+  Escape: () => { drag = null; adding = false; choose(null); },
   Delete: (event) => remove(event.shiftKey ? "after" : "frame"),
   Backspace: () => remove("frame"),
   "[": () => nextKey(-1),
   "]": () => nextKey(1),
-  n: nextPerson, k: pinHere, u: unpinHere, f: fillHere, i: toggleIgnore, v: nextVisible,
+  n: nextPerson, a: add, r: review, k: pinHere, u: unpinHere, f: fillHere, i: toggleIgnore, v: nextVisible,
 };
 const NUDGES = { ArrowLeft: [-1, 0, 0], ArrowRight: [1, 0, 0], ArrowUp: [0, -1, 0], ArrowDown: [0, 1, 0], "+": [0, 0, 0.5], "=": [0, 0, 0.5], "-": [0, 0, -0.5] };
 
 const onKey = (event) => {
   const target = event.target;
   const typing = target instanceof HTMLInputElement && target.type === "number" || target instanceof HTMLSelectElement;
-  if (!about || typing) return;
+  if (!about || typing || finished) return;
   const name = event.key.length === 1 ? event.key.toLowerCase() : event.key;
   let act = null;
   const digit = /^(?:Digit|Numpad)([1-9])$/.exec(event.code);
@@ -373,7 +410,7 @@ const onKey = (event) => {
 const listen = () => {
   const buttons = {
     back: () => go(at - 1), ahead: () => go(at + 1), play: () => play(playing === null),
-    undo: () => change({ op: "undo" }), redo: () => change({ op: "redo" }),
+    undo: () => change({ op: "undo" }), redo: () => change({ op: "redo" }), add, review,
     pin: pinHere, unpin: unpinHere, fill: fillHere,
     delete: () => remove("frame"), "delete-after": () => remove("after"),
     "delete-before": () => remove("before"), "delete-all": () => remove("all"),
@@ -391,6 +428,10 @@ const listen = () => {
       finished = true;
       able.saved = true;
       show();
+      // Nothing answers any more.
+      play(false);
+      document.querySelector("main").inert = true;
+      byId("finish").disabled = true;
       byId("saved").textContent = `Finished: all is saved in ${about.file}. This page can be closed.`;
     } catch (error) {
       tell(error.message);

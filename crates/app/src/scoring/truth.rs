@@ -1,4 +1,4 @@
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use crate::outcome::Failure;
@@ -17,13 +17,16 @@ use super::{Shots, odd_labels, read_text, region, without_area};
 /// Largest difference between the stamps of an image and its truth in a log, ns.
 const SAME_MOMENT_NS: u64 = 5_000_000;
 
+/// Option of `eval` for truth that follows rules of its own, at the end of an error.
+pub const RULES_HINT: &str = " (--rules mot15, mot17 or mot20)";
+
 /// Number of frames, and part of all frames, after the last person of a truth beyond which it may be
 /// unfinished.
 const EARLY_FRAMES: u32 = 10;
 const EARLY_PART: f64 = 0.2;
 
 /// Assumed height of a person in a whole-body box, m.
-const STANDING_HEIGHT_M: f64 = 1.7;
+pub const STANDING_HEIGHT_M: f64 = 1.7;
 
 /// People in a frame, and its regions without annotation.
 pub type People = (Vec<Truth>, Vec<Region>);
@@ -186,7 +189,7 @@ impl TruthFile {
             RulesChoice::Auto => mot::Rules::of_truth(&text, &name).map_err(|error| {
                 // Rows that no rules can read are refused by the same function.
                 let is_of_rules = error.why.contains("rules");
-                let hint = if is_of_rules { " (--rules mot15, mot17 or mot20)" } else { "" };
+                let hint = if is_of_rules { RULES_HINT } else { "" };
                 Failure::failed(format!("{error}{hint}"))
             })?,
             RulesChoice::Mot15 => mot::Rules::Mot15,
@@ -209,8 +212,10 @@ impl TruthFile {
 
     fn of_people(path: &Path) -> Result<Self, Failure> {
         let text = read_text(path)?;
-        let rows = people::parse(&text, &path.display().to_string()).map_err(Failure::failed)?;
+        let name = path.display().to_string();
+        let rows = people::parse(&text, &name).map_err(Failure::failed)?;
         let mut file = Self::empty(Kind::People);
+        file.notes.extend(proposed_note(&name, &rows));
         for row in rows {
             let (number, truth) = row.truth(|_| None);
             let head = row.head_in_camera_m;
@@ -392,6 +397,24 @@ impl TruthPosition {
     }
 }
 
+/// Returns a note on boxes of a truth that a pipeline proposed and nobody reviewed.
+fn proposed_note(name: &str, rows: &[people::Row]) -> Option<String> {
+    let proposed = rows.iter().filter(|row| !row.proposed.is_empty());
+    let proposers: BTreeSet<&str> = proposed.clone().map(|row| row.proposed.as_str()).collect();
+    let frames: BTreeSet<u32> = proposed.clone().map(|row| row.frame).collect();
+    let proposers: Vec<&str> = proposers.into_iter().collect();
+    (!proposers.is_empty()).then(|| {
+        format!(
+            "{name}: {} of {} boxes, in {} frames, were proposed by {} and not reviewed: figures of it, and \
+             of pipelines like it, are too good there",
+            proposed.count(),
+            rows.len(),
+            frames.len(),
+            proposers.join(" and ")
+        )
+    })
+}
+
 /// Returns true for the tracks in the folder of a run.
 fn is_of_run(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -570,6 +593,26 @@ mod tests {
             region: Some(Region { x, y: 0.0, width: 3.0, height: 4.0 }),
             ..Truth::default()
         }
+    }
+
+    #[test]
+    fn proposed_boxes_that_nobody_reviewed_are_told() {
+        let home = tempfile::tempdir().expect("a folder");
+        let path = home.path().join("walk.people.csv");
+        let text = "frame,id,ub_x,ub_y,ub_w,ub_h,proposed\n1,1,5,5,9,9,depth-ekf\n1,2,5,5,9,9,\n\
+                    2,1,5,5,9,9,depth-ekf\n";
+        std::fs::write(&path, text).expect("a file");
+        let told = TruthFile::read(&path, TruthOptions::default()).expect("a truth").notes;
+        assert!(
+            told.len() == 1
+                && told[0].contains("2 of 3 boxes, in 2 frames, were proposed by depth-ekf"),
+            "{told:?}"
+        );
+        std::fs::write(&path, text.replace("depth-ekf", "")).expect("a file");
+        assert_eq!(
+            TruthFile::read(&path, TruthOptions::default()).expect("a truth").notes,
+            [""; 0]
+        );
     }
 
     #[test]

@@ -9,7 +9,7 @@ use crate::types::{Region, Role, Truth, View};
 
 /// The columns, in the order in which they are written.
 pub const HEADER: &str = "frame,id,ub_x,ub_y,ub_w,ub_h,vis_x,vis_y,vis_w,vis_h,\
-head_x,head_y,head_z,visible,occluder,ignore,interpolated,key";
+head_x,head_y,head_z,visible,occluder,ignore,interpolated,key,proposed";
 
 const UPPER_BODY: [&str; 4] = ["ub_x", "ub_y", "ub_w", "ub_h"];
 const VISIBLE_BODY: [&str; 4] = ["vis_x", "vis_y", "vis_w", "vis_h"];
@@ -39,6 +39,8 @@ pub struct Row {
     pub interpolated: u8,
     /// True if the box was set by hand, false if it lies between boxes that were; true by default.
     pub key: bool,
+    /// Pipeline that proposed the box, if nobody reviewed it; empty by default.
+    pub proposed: String,
 }
 
 impl Row {
@@ -146,6 +148,10 @@ impl Cells<'_> {
             ignore: self.number_or("ignore", 0.0)? != 0.0,
             interpolated: self.number_or("interpolated", 0.0)?.clamp(0.0, 255.0) as u8,
             key: self.number_or("key", 1.0)? != 0.0,
+            proposed: match self.filled("proposed")? {
+                Some(at) => line.text(at, "proposed")?.to_owned(),
+                None => String::new(),
+            },
         };
         if row.upper_body.is_none() && row.head_in_camera_m.is_none() {
             return Err(line.error("has neither a box (ub_*) nor a place (head_*)"));
@@ -171,7 +177,8 @@ pub fn write(out: &mut impl Write, rows: &[Row]) -> io::Result<()> {
         let key = u8::from(row.key);
         let visible = row.visible;
         let occluder = &row.occluder;
-        writeln!(out, ",{visible},{occluder},{ignore},{},{key}", row.interpolated)?;
+        let proposed = &row.proposed;
+        writeln!(out, ",{visible},{occluder},{ignore},{},{key},{proposed}", row.interpolated)?;
     }
     Ok(())
 }
