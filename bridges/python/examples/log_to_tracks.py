@@ -7,4 +7,5 @@ import tagalong
 pipeline = tagalong.Pipeline.from_toml("depth-verified")
 for frame in pipeline.frames("people.mcap"):
     for track in pipeline.step_frame(frame).tracks:
-        print(f"{track.id} at {math.hypot(*track.position):.2f} m")
+        if track.seen:
+            print(f"{track.id} at {math.hypot(*track.position[:2]):.2f} m")

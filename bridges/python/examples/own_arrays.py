@@ -19,4 +19,4 @@ camera = tagalong.Camera(640, 480, fx=525.0, height_m=1.2)
 pipeline = tagalong.Pipeline.from_toml("depth-ekf")
 for count in range(20):
     for track in pipeline.step(None, depth.astype(np.float32), camera, None, 0.1 * count).tracks:
-        print(f"{track.id} at {math.hypot(*track.position):.2f} m")
+        print(f"{track.id} at {math.hypot(*track.position[:2]):.2f} m")

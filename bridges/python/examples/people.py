@@ -61,7 +61,8 @@ for frame in pipeline.frames(log):
     x, y, heading = frame.pose
     turn = np.array([[np.cos(heading), -np.sin(heading)], [np.sin(heading), np.cos(heading)]])
     for track in report.tracks:
-        at = turn @ track.position[:2] + (x, y)
+        # Where nothing was detected the track is predicted: a gap in the path.
+        at = turn @ track.position[:2] + (x, y) if track.seen else (np.nan, np.nan)
         sigma = np.sqrt(np.linalg.eigvalsh(track.covariance[:2, :2]).max())
         paths.setdefault(track.id, []).append((frame.stamp_ns * 1e-9, *at, sigma))
     # The picture shows the frame with most people in view.
@@ -75,7 +76,7 @@ frame, report = shown
 picture = frame.depth if frame.colour is None else frame.colour
 image.imshow(picture, cmap=None if picture.ndim == 3 else "gray")
 for track in report.tracks:
-    if track.box:
+    if track.seen and track.box:
         left, top, width, height = track.box
         colour = colours[track.id]
         image.add_patch(plt.Rectangle((left, top), width, height, fill=False, ec=colour, lw=2))
@@ -83,12 +84,14 @@ for track in report.tracks:
 image.set(title=f"frame {frame.index}", xlabel="column, px", ylabel="row, px")
 for track, steps in paths.items():
     stamps, xs, ys, sigmas = np.array(steps).T
-    plan.plot(xs, ys, color=colours[track], label=f"person {track}")
-    plan.plot(xs[-1], ys[-1], "o", color=colours[track])
+    plan.plot(xs, ys, color=colours[track], label=f"track {track}")
+    seen = np.flatnonzero(np.isfinite(xs))
+    plan.plot(xs[seen[-1:]], ys[seen[-1:]], "o", color=colours[track])
     certainty.plot(stamps - paths[min(paths)][0][0], sigmas, color=colours[track])
 plan.plot(0, 0, "k^", label="robot at the start")
 plan.set(title="plan, odometry frame", xlabel="x, m", ylabel="y, m", aspect="equal")
-plan.legend()
+# Below the plan, where it hides no path.
+plan.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=4)
 certainty.set(title="uncertainty of the place", xlabel="time, s", ylabel="standard deviation, m")
 figure.savefig(arguments.output, dpi=100)
-print(f"{len(paths)} people in {count} frames: {arguments.output}")
+print(f"{len(paths)} tracks in {count} frames: {arguments.output}")

@@ -11,7 +11,8 @@ use numpy::{
 };
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use tagalong::core::{DepthImage, GreyImage, Images, RgbImage, planar_pose};
+use tagalong::core::{DepthImage, ExternalDetection, GreyImage, Images, RgbImage, planar_pose};
+use tagalong::geometry::Rect;
 
 use crate::errors::wrong;
 
@@ -145,6 +146,36 @@ pub fn points(array: &Bound<'_, PyAny>) -> PyResult<Vec<Point3<f64>>> {
         return Err(wrong("scan has numbers that are not finite; leave those rays out"));
     }
     Ok(points)
+}
+
+/// Returns the detections of the caller: rows of x, y, width, height, score (a box, pixels), or of x, y,
+/// z, score (the centre of a head in the robot frame, m).
+///
+/// # Errors
+/// `ValueError` for other rows, a box without an area, and numbers that are not finite.
+pub fn detections(given: &Bound<'_, PyAny>) -> PyResult<Vec<ExternalDetection>> {
+    let rows: Vec<Vec<f64>> = given.extract().map_err(|_| wrong(ROWS))?;
+    rows.iter().map(|row| detection(row)).collect()
+}
+
+/// Words about detections of another shape.
+const ROWS: &str = "detections are rows of x, y, width, height, score (a box in the image, pixels), or of \
+                    x, y, z, score (the centre of the head in the robot frame, m)";
+
+fn detection(row: &[f64]) -> PyResult<ExternalDetection> {
+    if row.iter().any(|value| !value.is_finite()) {
+        return Err(wrong("detections have numbers that are not finite"));
+    }
+    match *row {
+        [x, y, width, height, score] if width > 0.0 && height > 0.0 => {
+            Ok(ExternalDetection::in_image(Rect::new(x, y, width, height), score))
+        }
+        [_, _, width, height, _] => {
+            Err(wrong(format!("a detection is {width} x {height} pixels; both must be above 0")))
+        }
+        [x, y, z, score] => Ok(ExternalDetection::at(Point3::new(x, y, z), score)),
+        _ => Err(wrong(ROWS)),
+    }
 }
 
 /// Returns a pose on the floor: x, y (m) and heading (rad), or a 4 x 4 matrix.

@@ -9,7 +9,7 @@ use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use tagalong_app::format::Format;
 use tagalong_app::input_args::InputArgs;
-use tagalong_app::outcome::{Ended, Outcome};
+use tagalong_app::outcome::{Ended, Failure, Outcome};
 use tagalong_app::signals::Signals;
 use tagalong_cli::{
     EvalArgs, Overlaid, RunArgs, SimilarityChoice, eval_json, main_from, run_until,
@@ -22,8 +22,8 @@ const LOOK: Duration = Duration::from_millis(10);
 /// Longest wait for a run to finish its files after Ctrl-C.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// Runs the program with these arguments, without its name, and returns its exit code. `--help` and
-/// wrong usage end the process.
+/// Runs the program with these arguments, without its name, and returns its exit code: 0 also for
+/// `--help`, and 2 for wrong usage.
 #[pyfunction]
 pub fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
     let all = [OsString::from("tagalong")].into_iter().chain(arguments);
@@ -34,7 +34,7 @@ pub fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
 /// Runs a pipeline over a log and writes the files of `tagalong run`; returns true if part of the
 /// log was lost.
 #[pyfunction]
-#[pyo3(signature = (config, log, out, *, overlay, with_images, overwrite, strict, seed, camera))]
+#[pyo3(signature = (config, log, out, *, overlay, with_images, smoothed, overwrite, strict, seed, camera))]
 #[allow(clippy::too_many_arguments, reason = "they are the keywords of a Python function")]
 pub fn run(
     py: Python<'_>,
@@ -43,6 +43,7 @@ pub fn run(
     out: PathBuf,
     overlay: bool,
     with_images: bool,
+    smoothed: bool,
     overwrite: bool,
     strict: bool,
     seed: Option<u64>,
@@ -57,6 +58,7 @@ pub fn run(
         log,
         overlay: overlay.then_some(Overlaid::People),
         with_images,
+        smoothed,
         overwrite,
         strict,
         seed,
@@ -64,7 +66,7 @@ pub fn run(
         ..RunArgs::quiet(Some(config), out)
     };
 
-    match interruptible(py, args)?.map_err(raised)? {
+    match interruptible(py, args)?.map_err(in_python)? {
         Ended::Well => Ok(false),
         Ended::WithLoss | Ended::WithFindings => Ok(true),
         Ended::BySignal(_) => {
@@ -129,5 +131,30 @@ pub fn scores(
         rate,
         format: Format::default(),
     };
-    py.detach(|| eval_json(&args)).map_err(raised)
+    py.detach(|| eval_json(&args)).map_err(in_python)
+}
+
+/// Options of the program in its messages, and the arguments of the functions here.
+const ARGUMENTS: [(&str, &str); 13] = [
+    ("--overwrite", "overwrite=True"),
+    ("--strict", "strict=True"),
+    ("--with-images", "with_images=True"),
+    ("--camera", "camera"),
+    ("--similarity metres", "similarity=\"metres\""),
+    ("--similarity iou", "similarity=\"iou\""),
+    ("--log LOG", "log=LOG"),
+    ("--rate HZ", "rate=HZ"),
+    ("--rate is", "rate is"),
+    ("--truth", "truth"),
+    ("--tracks", "tracks"),
+    ("--upper-body", "upper_body=True"),
+    ("--drop-doubled-ids", "drop_doubled_ids=True"),
+];
+
+/// Returns the exception of a failed command, with the words of Python.
+fn in_python(mut failure: Failure) -> PyErr {
+    for (option, argument) in ARGUMENTS {
+        failure.message = failure.message.replace(option, argument);
+    }
+    raised(failure)
 }

@@ -7,6 +7,7 @@
 mod arrays;
 mod camera;
 mod commands;
+mod doubts;
 mod errors;
 mod frames;
 mod pipeline;

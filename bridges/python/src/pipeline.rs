@@ -1,18 +1,21 @@
 //! Pipelines.
 
+use std::ffi::CString;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use nalgebra::Isometry2;
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
-use pyo3::types::PyString;
-use tagalong::core::{Images, LaserScan, RightImage, Stamp, TrackId};
+use pyo3::types::{PyInt, PyString};
+use tagalong::core::{ExternalDetection, Images, Input, LaserScan, RightImage, Stamp, TrackId};
 use tagalong::geometry::Camera;
-use tagalong::pipeline::{Choice, Enrollment};
+use tagalong::pipeline::{Choice, Enrollment, StepError};
 use tagalong::{ConfigSource, FrameMaker, FrameReport, LogSettings, Pipeline};
 
 use crate::arrays;
 use crate::camera::PyCamera;
+use crate::doubts::Doubts;
 use crate::errors::{ConfigError, failed, raised, wrong};
 use crate::frames::{PyFrame, PyFrames};
 use crate::report::{PyCommand, PyReport, stamp};
@@ -21,6 +24,7 @@ use crate::report::{PyCommand, PyReport, stamp};
 #[pyclass(name = "Pipeline", module = "tagalong", frozen)]
 pub struct PyPipeline {
     work: Mutex<Work>,
+    doubts: Mutex<Doubts>,
 }
 
 /// Pipeline with the maker of its frames.
@@ -29,6 +33,8 @@ struct Work {
     maker: FrameMaker,
     /// True before the first frame of arrays, at which the sources of a controller are checked.
     is_new: bool,
+    /// True once a frame of arrays had detections.
+    is_told: bool,
 }
 
 /// Data of one moment.
@@ -39,6 +45,7 @@ struct Data {
     pose: Option<Isometry2<f64>>,
     images: Images,
     scan: Option<LaserScan>,
+    detections: Option<Vec<ExternalDetection>>,
     odometry_age_s: Option<f64>,
 }
 
@@ -65,17 +72,24 @@ impl PyPipeline {
 
     /// Takes one frame through the pipeline and returns a Report.
     ///
+    /// Raises ValueError for a frame that cannot be used, such as one without depth for a pipeline that
+    /// needs it: the frame leads to no command, and the next one is taken as usual.
+    ///
     /// colour: uint8, rows x columns x 3 (red, green, blue) or rows x columns. depth: float32 in
     /// metres or uint16 in millimetres, registered to colour. camera: a Camera, of the size of the
     /// images. pose: of the robot in the odometry frame, (x, y, heading) or 4 x 4; None without
     /// odometry. stamp: capture time, ns as an int or seconds as a float. scan: float64, rows of
-    /// x, y or x, y, z of a laser scan in the robot frame. scan_stamp: time of the scan, as stamp, where
-    /// the scanner is slower than the images and its last scan is given again [default: stamp]. right, baseline_m: the right image of a
-    /// rectified stereo pair. index: number of the frame [default: frames so far]. odometry_age_s: age of
-    /// the reading of odometry from which the pose is, at the time of the stamp; a robot is not
-    /// steered by an old one [default: 0, and infinite without a pose].
+    /// x, y or x, y, z of a laser scan in the robot frame. scan_stamp: time of the scan, as stamp,
+    /// where the scanner is slower than the images and its last scan is given again [default:
+    /// stamp]. right, baseline_m: the right image of a rectified stereo pair. index: number of the
+    /// frame [default: frames so far]. odometry_age_s: age of the reading of odometry from which the
+    /// pose is, at the time of the stamp; a robot is not steered by an old one [default: 0, and
+    /// infinite without a pose]. detections: those of a detector of your own, for a config with the
+    /// plugin `recorded-detections` ("recorded"): rows of x, y, width, height, score, pixels of the
+    /// camera's image, or of x, y, z, score, the centre of the head in the robot frame, m; [] where
+    /// it found nobody, None where it did not run.
     #[pyo3(signature = (colour, depth, camera, pose, stamp, *, scan=None, scan_stamp=None, right=None,
-        baseline_m=None, index=None, odometry_age_s=None))]
+        baseline_m=None, index=None, odometry_age_s=None, detections=None))]
     #[allow(clippy::too_many_arguments, reason = "they are the keywords of a Python method")]
     fn step(
         &self,
@@ -91,6 +105,7 @@ impl PyPipeline {
         baseline_m: Option<f64>,
         index: Option<u64>,
         odometry_age_s: Option<f64>,
+        detections: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyReport> {
         let mut images = Images::default();
         colour.map(|array| arrays::add_colour(&mut images, array)).transpose()?;
@@ -103,8 +118,11 @@ impl PyPipeline {
             (scan, _) => scan,
         };
         let pose = pose.map(arrays::pose).transpose()?;
+        let detections = detections.map(arrays::detections).transpose()?;
+        let is_whole = stamp.is_instance_of::<PyInt>();
         let stamp = self::stamp(stamp)?;
-        let data = Data { index, stamp, camera, pose, images, scan, odometry_age_s };
+        self.doubt(py, &images, is_whole.then_some(stamp))?;
+        let data = Data { index, stamp, camera, pose, images, scan, detections, odometry_age_s };
         let (report, camera) = py.detach(|| self.work()?.step(data))?;
         PyReport::new(py, report, &camera)
     }
@@ -114,7 +132,7 @@ impl PyPipeline {
         let frame = &frame.0;
         let report = py.detach(|| {
             let step = self.work()?.pipeline.step(&**frame);
-            step.map_err(failed)
+            step.map_err(told)
         })?;
         PyReport::new(py, report, &frame.frame.camera)
     }
@@ -189,7 +207,14 @@ impl PyPipeline {
         let pipeline = builder.build(source)?;
         let sigma = LogSettings::of(&pipeline)?.input.odometry_sigma;
         let maker = FrameMaker::without_camera().with_odometry_sigma(sigma);
-        Ok(Self { work: Mutex::new(Work { pipeline, maker, is_new: true }) })
+        let work = Work { pipeline, maker, is_new: true, is_told: false };
+        Ok(Self { work: Mutex::new(work), doubts: Mutex::default() })
+    }
+
+    /// Warns of arrays and stamps that are probably not meant so, once of each kind.
+    fn doubt(&self, py: Python<'_>, images: &Images, stamp: Option<Stamp>) -> PyResult<()> {
+        let said = self.doubts.lock().unwrap_or_else(PoisonError::into_inner).of(images, stamp);
+        said.iter().try_for_each(|words| warn(py, words))
     }
 
     fn work(&self) -> PyResult<MutexGuard<'_, Work>> {
@@ -222,10 +247,36 @@ impl Work {
             checked.map_err(|why| ConfigError::new_err(why.to_string()))?;
         }
         let frame = moment.frame().map_err(wrong)?;
-        let report = self.pipeline.step(&frame).map_err(failed)?;
+        let boxes = data.detections.iter().flatten().any(|found| found.region.is_some());
+        if boxes && frame.camera.is_blind() {
+            return Err(wrong("detections are boxes in the image: give its camera"));
+        }
+        self.is_told |= data.detections.is_some();
+        if !self.is_told && self.pipeline.inputs().requires(Input::Detections) {
+            return Err(wrong(
+                "the pipeline tracks the people of another detector, and no frame had any: give \
+                 detections=[(x, y, width, height, score), ...], and [] where there is nobody",
+            ));
+        }
+        let frame = frame.with_recorded(data.detections);
+        let report = self.pipeline.step(&frame).map_err(told)?;
         self.is_new = false;
         Ok((report, frame.camera))
     }
+}
+
+/// Returns the exception of a frame that failed: one that is refused alone is a wrong argument.
+fn told(error: StepError) -> PyErr {
+    match error {
+        StepError::Lacks { .. } => wrong(error),
+        _ => failed(error),
+    }
+}
+
+/// Warns the caller of `step`.
+fn warn(py: Python<'_>, words: &str) -> PyResult<()> {
+    let words = CString::new(words).map_err(failed)?;
+    PyErr::warn(py, &py.get_type::<PyUserWarning>(), &words, 1)
 }
 
 /// Returns the config that a path, a name or a text stands for.
@@ -234,7 +285,8 @@ fn config(source: &Bound<'_, PyAny>, folder: Option<&Path>) -> PyResult<ConfigSo
         let text = text.to_string();
         // No name of a config has either.
         if text.contains(['\n', '=']) {
-            return Ok(ConfigSource::from_text(text, folder.unwrap_or(Path::new(""))));
+            let source = ConfigSource::from_text(text, folder.unwrap_or(Path::new("")));
+            return Ok(source.with_name("<text>"));
         }
     }
     ConfigSource::open(source.extract::<PathBuf>()?).map_err(raised)

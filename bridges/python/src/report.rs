@@ -88,13 +88,14 @@ impl PyTrack {
         Some(self.joints.as_ref()?.has_raised_hand())
     }
 
-    /// Probability that this is a person, smoothed over the track.
+    /// Probability that this is a person, smoothed over the track; its log-odds are `score` in Rust.
     #[getter]
     fn score(&self) -> f64 {
         1.0 / (1.0 + (-self.track.score).exp())
     }
 
-    /// True if evidence of this frame supports the track; otherwise it is predicted.
+    /// True if evidence of this frame supports the track; otherwise it is predicted, ever less
+    /// surely, also outside of the view.
     #[getter]
     fn seen(&self) -> bool {
         self.track.seen
@@ -224,20 +225,15 @@ impl PyReport {
         self.report.stamp.nanos()
     }
 
-    /// "processed", or the reason for which the frame was left out or the tracks began anew:
-    /// "duplicate", "out-of-order", "reset-backward", "reset-forward".
+    /// "processed"; or, by its stamp: "duplicate" (that of the frame before) and "out-of-order" (a little
+    /// older), where the frame was left out; "reset-backward" and "reset-forward" (the clock was set back,
+    /// or jumped ahead), where all tracks ended before it was processed.
     #[getter]
     fn outcome(&self) -> &'static str {
-        match self.report.outcome {
-            Outcome::ResetBackward { .. } => "reset-backward",
-            Outcome::ResetForward { .. } => "reset-forward",
-            Outcome::Duplicate => "duplicate",
-            Outcome::OutOfOrder => "out-of-order",
-            _ => "processed",
-        }
+        outcome(&self.report.outcome).0
     }
 
-    /// The confirmed tracks, near to far.
+    /// The confirmed tracks, near to far; also those that are predicted, see `Track.seen`.
     #[getter]
     fn tracks(&self, py: Python<'_>) -> Vec<Py<PyTrack>> {
         self.those(py, true)
@@ -282,16 +278,44 @@ impl PyReport {
 
     fn __repr__(&self) -> String {
         let confirmed = self.report.tracks.iter().filter(|track| track.confirmed).count();
-        format!("Report(frame {}, {confirmed} tracks)", self.report.index)
+        let (name, words) = outcome(&self.report.outcome);
+        let odd = if words.is_empty() { String::new() } else { format!(", {name}: {words}") };
+        format!("Report(frame {}, {confirmed} tracks{odd})", self.report.index)
     }
 }
+
+/// Returns the name of an outcome and, where the frame was not just processed, words about it.
+fn outcome(outcome: &Outcome) -> (&'static str, &'static str) {
+    match outcome {
+        Outcome::Duplicate => ("duplicate", "left out, its stamp is that of the frame before"),
+        Outcome::OutOfOrder => {
+            ("out-of-order", "left out, its stamp is before that of the last frame")
+        }
+        Outcome::ResetBackward { .. } => {
+            ("reset-backward", "the clock was set back, all tracks ended")
+        }
+        Outcome::ResetForward { .. } => {
+            ("reset-forward", "the clock jumped ahead, all tracks ended")
+        }
+        _ => ("processed", ""),
+    }
+}
+
+/// Whole numbers from 1 up to this are probably seconds or a count, and no nanoseconds.
+const FEW_NS: u64 = 1_000_000;
 
 /// Returns a time: whole nanoseconds, or seconds as a float.
 ///
 /// # Errors
-/// `TypeError` for something else, `ValueError` for a time that is negative or not finite.
+/// `TypeError` for something else, `ValueError` for a time that is negative, not finite, or within the
+/// first millisecond but no zero.
 pub fn stamp(given: &Bound<'_, PyAny>) -> PyResult<Stamp> {
     if let Ok(nanos) = given.extract::<u64>() {
+        if (1..FEW_NS).contains(&nanos) {
+            return Err(crate::errors::wrong(format!(
+                "stamp is {nanos}: an int is nanoseconds; give seconds as a float"
+            )));
+        }
         return Ok(Stamp::from_nanos(nanos));
     }
     let seconds: f64 = given.extract()?;

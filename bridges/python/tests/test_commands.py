@@ -21,9 +21,14 @@ def test_a_run_from_python_writes_the_bytes_of_the_program(log, run, tmp_path):
     report = tagalong.run("depth-ekf", log, tmp_path / "mine")
     assert files_of(tmp_path / "mine") == files_of(run)
     assert report == json.loads((run / "report.json").read_text())
-    with pytest.raises(tagalong.ConfigError, match="overwrite"):
+    with pytest.raises(tagalong.ConfigError, match="or overwrite=True$"):
         tagalong.run("depth-ekf", log, tmp_path / "mine")
-    tagalong.run("depth-ekf", str(log), str(tmp_path / "mine"), overwrite=True, seed=3)
+    with pytest.raises(tagalong.TagalongError, match="smoothed=True"):
+        tagalong.read_tracks(tmp_path / "mine", smoothed=True)
+    again = str(tmp_path / "mine")
+    tagalong.run("depth-ekf", str(log), again, overwrite=True, seed=3, smoothed=True)
+    smoothed = tagalong.read_tracks(again, smoothed=True)
+    assert len(smoothed["id"]) == len(tagalong.read_tracks(tmp_path / "mine/tracks.csv")["id"]) > 20
 
 
 def test_a_log_that_is_none_is_an_error(tmp_path):
@@ -45,6 +50,8 @@ def test_figures_are_those_of_the_program(log, run, program):
     assert tagalong.eval(log, run, similarity="metres")["HOTA"] > 0.1
     repaired = tagalong.eval(log, run, repairs=True)["repairs"]
     assert [row["repair"] for row in repaired][:2] == ["identities", "false-reports"]
+    with pytest.raises(tagalong.ConfigError, match='similarity="metres"'):
+        tagalong.eval(log, run / "tracks-metres.csv")
     with pytest.raises(ValueError, match="similarity"):
         tagalong.eval(log, run, similarity="feet")
     with pytest.raises(tagalong.TagalongError, match="nowhere"):
@@ -74,6 +81,29 @@ def test_the_program_ends_with_its_exit_codes(program, tmp_path):
     assert wrong.returncode in (1, 2) and "none" in wrong.stderr
     assert program("frobnicate").returncode == 2
     assert tagalong.main(["list", "--format", "json"]) == 0
+
+
+def test_main_returns_the_code_of_wrong_usage_and_of_help():
+    """In a notebook the interpreter must go on."""
+    assert tagalong.main(["run", "--no-such-option"]) == 2
+    assert tagalong.main([]) == 2
+    assert tagalong.main(["--help"]) == 0
+    assert tagalong.main(["--version"]) == 0
+
+
+def test_eval_finds_the_log_that_the_run_names(log, run, tmp_path):
+    """The truth, whose places need the pose of the camera in the log, is elsewhere."""
+    tracks = tagalong.read_tracks(run)
+    row = np.flatnonzero(tracks["seen"])[-1]
+    number = tracks["frame"][row]
+    frames = tagalong.Pipeline.from_toml("depth-ekf").frames(log)
+    (frame,) = [frame for frame in frames if frame.index == number]
+    place = [*(tracks[f"{axis}_robot_m"][row] for axis in "xyz"), 1.0]
+    right, down, forward, _ = np.linalg.inv(frame.camera.robot_from_camera) @ place
+    truth = tmp_path / "mine.csv"
+    truth.write_text(f"frame,id,head_x,head_y,head_z\n{number},7,{right},{down},{forward}\n")
+    found = tagalong.eval(truth, run, similarity="metres")
+    assert (found["truths"], found["TP"]) == (1, 1)
 
 
 INTERRUPTED = """

@@ -1,8 +1,11 @@
 """Pipelines on arrays and on logs."""
 
+import ast
+import inspect
 import pathlib
 import threading
 import time
+import warnings
 
 import numpy as np
 import pytest
@@ -73,7 +76,7 @@ def test_a_config_is_a_name_a_file_or_a_text(tmp_path):
 def test_mistakes_in_configs_are_shown_with_their_line(tmp_path):
     with pytest.raises(tagalong.ConfigError, match="depth-ekv"):
         tagalong.Pipeline.from_toml("depth-ekv")
-    with pytest.raises(tagalong.ConfigError, match=r"config.toml:1:1: unknown key `sed`; did you mean `seed`"):
+    with pytest.raises(tagalong.ConfigError, match=r"^<text>:1:1: unknown key `sed`; did you mean `seed`"):
         tagalong.Pipeline.from_toml("sed = 1\n")
     with pytest.raises(ValueError):
         tagalong.Pipeline.from_toml(tmp_path / "none.toml")
@@ -206,6 +209,113 @@ def test_stamps_are_nanoseconds_or_seconds_and_repeated_ones_are_told():
     assert outcomes == told
 
 
+def test_an_outcome_other_than_processed_is_shown():
+    pipeline = tagalong.Pipeline.from_toml("depth-ekf")
+    reports = [pipeline.step(None, DEPTH, CAMERA, None, stamp) for stamp in [10.0, 10.0, 2.0]]
+    shown = [repr(report) for report in reports]
+    assert shown[0] == "Report(frame 1, 0 tracks)"
+    assert "duplicate: left out" in shown[1] and "reset-backward: the clock" in shown[2]
+
+
+def test_stamps_in_other_units_are_told():
+    pipeline = tagalong.Pipeline.from_toml("depth-ekf")
+    with pytest.raises(ValueError, match="stamp is 11: an int is nanoseconds"):
+        pipeline.step(None, DEPTH, CAMERA, None, 11)
+    pipeline.step(None, DEPTH, CAMERA, None, 1_790_000_000)
+    with pytest.warns(UserWarning, match="stamp is 1 ns after") as told:
+        for second in (1, 2, 3):
+            pipeline.step(None, DEPTH, CAMERA, None, 1_790_000_000 + second)
+    assert len(told) == 1
+
+
+def test_a_frame_without_depth_is_refused_alone(log):
+    pipeline = tagalong.Pipeline.from_toml("follow-depth")
+    frames = list(pipeline.frames(log))
+    given = lambda f, depth: pipeline.step(None, depth, f.camera, f.pose, f.stamp_ns)
+    before = [given(f, f.depth) for f in frames[:-2]][-1]
+    assert before.tracks
+    with pytest.raises(ValueError, match="needs depth images, which this frame does not have"):
+        given(frames[-2], None)
+    assert pipeline.command_at(before.command.valid_until_ns + 1).reason == "expired"
+    after = given(frames[-1], frames[-1].depth)
+    assert {t.id for t in after.tracks} & {t.id for t in before.tracks}
+    assert pipeline.fault is None and after.command is not None
+
+
+def test_depth_and_sizes_that_are_odd_are_told_once():
+    def told(*depths):
+        pipeline = tagalong.Pipeline.from_toml("depth-ekf")
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            for count, depth in enumerate(depths):
+                rows, columns = depth.shape
+                camera = tagalong.Camera(columns, rows, fx=60.0, height_m=1.2)
+                pipeline.step(None, depth, camera, None, 1.0 + 0.1 * count)
+        return [str(one.message) for one in said]
+
+    assert told(DEPTH, DEPTH) == []
+    (metres,) = told(DEPTH * 1000.0, DEPTH * 1000.0)
+    assert metres.startswith("the median of depth is 3000 m: floats are metres")
+    (empty,) = told(DEPTH * np.nan, DEPTH * 0.0)
+    assert empty.startswith("depth has not one reading")
+    (size,) = told(DEPTH, DEPTH[:40], DEPTH)
+    assert size.startswith("the images have 64 x 40 pixels, and those before 64 x 48")
+
+
+# A person of 1.7 m who walks to the right, 4 m before the camera.
+CAMERA_OF_BOXES = tagalong.Camera(640, 480, fx=525.0, height_m=1.2)
+BOXES = [(200.0 + 5.0 * step, 174.0, 60.0, 223.0, 0.9) for step in range(20)]
+HEADS = [(4.0, 0.9 - 0.04 * step, 1.6, 0.9) for step in range(20)]
+
+
+@pytest.mark.parametrize(
+    ("config", "walk", "rows"),
+    [
+        ("recorded", BOXES, lambda found: [found]),
+        ("recorded", BOXES, lambda found: np.array([found])),
+        ("heads", HEADS, lambda found: [found]),
+    ],
+)
+def test_detections_of_the_caller_are_tracked(config, walk, rows):
+    pipeline = tagalong.Pipeline.from_toml(RECORDED_HEADS if config == "heads" else config)
+    step = lambda at, found: pipeline.step(None, None, CAMERA_OF_BOXES, None, at, detections=found)
+    with pytest.raises(ValueError, match=r"give detections=\[\(x, y"):
+        step(1.0, None)
+    for count, found in enumerate(walk):
+        # The detector rests in every fourth frame.
+        report = step(2.0 + 0.1 * count, None if count % 4 == 1 else rows(found))
+    (track,) = report.tracks
+    assert track.seen and 3.5 < np.hypot(*track.position[:2]) < 4.6
+    (track,) = step(4.0, []).tracks
+    assert not track.seen
+
+
+RECORDED_HEADS = """
+filter.plugin = "ekf"
+[[detectors]]
+plugin = "recorded-detections"
+[input]
+detections_topic = "/none"
+"""
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        ([(1.0, 2.0)], "detections are rows of x, y, width, height, score"),
+        ([(1.0, 2.0, 0.0, 5.0, 0.5)], "a detection is 0 x 5 pixels"),
+        ([(1.0, 2.0, 3.0, float("nan"), 0.5)], "not finite"),
+        ("boxes", "detections are rows"),
+    ],
+)
+def test_detections_that_are_none_are_refused(rows, message):
+    pipeline = tagalong.Pipeline.from_toml("recorded")
+    with pytest.raises(ValueError, match=message):
+        pipeline.step(None, None, CAMERA, None, 1.0, detections=rows)
+    with pytest.raises(ValueError, match="give its camera"):
+        pipeline.step(None, None, None, None, 1.0, detections=[(1.0, 2.0, 3.0, 4.0, 0.5)])
+
+
 def test_a_controller_commands_and_needs_odometry(log):
     pipeline = tagalong.Pipeline.from_toml("follow-depth")
     assert pipeline.has_controller
@@ -310,3 +420,19 @@ def test_frames_tell_the_age_of_odometry(log):
         pipeline.step(COLOUR, DEPTH, CAMERA, (0, 0, 0), 2.0, odometry_age_s=-1.0)
     with pytest.raises(ValueError, match="odometry_age_s is NaN"):
         pipeline.step(COLOUR, DEPTH, CAMERA, (0, 0, 0), 3.0, odometry_age_s=float("nan"))
+
+
+def test_the_stub_says_what_the_classes_say():
+    stub = pathlib.Path(tagalong.__file__).with_name("_tagalong.pyi")
+    documented = 0
+    for node in ast.parse(stub.read_text()).body:
+        if not isinstance(node, ast.ClassDef) or ast.get_docstring(node) is None:
+            continue
+        of_class = getattr(tagalong, node.name)
+        pairs = [(node, of_class)]
+        functions = [inner for inner in node.body if isinstance(inner, ast.FunctionDef)]
+        pairs += [(inner, getattr(of_class, inner.name)) for inner in functions if inner.name[0] != "_"]
+        for written, real in pairs:
+            assert ast.get_docstring(written) == inspect.getdoc(real), written.name
+            documented += 1
+    assert documented > 60

@@ -35,7 +35,7 @@ pub fn main_with(register: impl FnOnce(&mut Registry)) -> ExitCode {
 }
 
 /// Runs the whole program with these arguments, of which the first is its name, and returns the exit
-/// code; `--help` and wrong usage end the process.
+/// code. A command line of wrong usage is told, and is 2; `--help` is printed, and is 0.
 pub fn main_from(
     arguments: impl IntoIterator<Item = OsString>,
     register: impl FnOnce(&mut Registry),
@@ -51,8 +51,11 @@ pub fn main_from(
             let message = error.render().to_string();
             return tell(&Failure::usage(message.trim_start_matches("error: ").trim_end()), true);
         }
-        // Wrong usage and --help end in here, with exit codes 2 and 0.
-        Err(error) => error.exit(),
+        Err(error) => {
+            // A closed stdout has no reader to inform.
+            let _ = error.print();
+            return u8::try_from(error.exit_code()).unwrap_or(2);
+        }
     };
     exit_code(&dispatch(&cli.command, &registry), for_programs)
 }

@@ -5,7 +5,7 @@ use crate::Input;
 #[non_exhaustive]
 pub enum Error {
     /// The frame lacks an image that the plugin requires.
-    #[error("needs {input}, which this log does not carry")]
+    #[error("needs {input}, which this frame does not have")]
     MissingImage {
         /// The kind of image.
         input: Input,

@@ -463,7 +463,7 @@ mod tests {
         let frame = frame(Images::default());
         assert_eq!(
             frame.depth().unwrap_err().to_string(),
-            "needs depth images, which this log does not carry"
+            "needs depth images, which this frame does not have"
         );
         assert!(frame.colour().is_err() && frame.right().is_err());
         assert!(frame.grey().unwrap_err().to_string().contains("colour or grey"));

@@ -36,7 +36,7 @@ mod tune;
 
 use checks::check;
 pub use document::{Document, flattened};
-use inputs::{Declared, declared_inputs};
+use inputs::{APPEARANCE, Declared, declared_inputs, describes};
 use resolve::{default_plugin, resolve};
 pub use resolved::ResolvedConfig;
 pub use source::{BuildError, ConfigSource};
@@ -171,15 +171,14 @@ impl Pipeline {
             manager,
             describer: describer.clone(),
         };
-        Ok(Self {
-            inputs,
-            tracker: Tracker::new(parts, settings.tracker()),
-            settings,
-            steering,
-            describer,
-            config,
-            failed: None,
-        })
+        let mut tracker = Tracker::new(parts, settings.tracker());
+        if let Some((name, inputs)) = steering.as_ref().map(Steering::inputs) {
+            tracker.require(name, inputs);
+        }
+        if describes(&settings, steering.is_some()) {
+            tracker.require("[appearance]", APPEARANCE);
+        }
+        Ok(Self { inputs, tracker, settings, steering, describer, config, failed: None })
     }
 }
 

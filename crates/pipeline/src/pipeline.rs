@@ -41,8 +41,9 @@ impl Pipeline {
     /// [`Frame::odometry_jumped`] the robot stops until [`Pipeline::arm`].
     ///
     /// # Errors
-    /// [`StepError`] if a plugin fails or panics. The pipeline is stopped then: each further call
-    /// fails.
+    /// [`StepError::Lacks`] for a frame without an input that a plugin requires: no plugin sees it, it
+    /// leads to no command, and the next frame is taken as usual. Another [`StepError`] if a plugin
+    /// fails or panics: the pipeline is stopped then, and each further call fails.
     pub fn step(&mut self, frame: impl AsRef<Frame>) -> Result<FrameReport, StepError> {
         self.step_frame(frame.as_ref())
     }
@@ -65,7 +66,8 @@ impl Pipeline {
         let report = self
             .process(restricted.as_ref().unwrap_or(frame))
             .map_err(|error| error.blame_declaration(frame));
-        if report.is_err() {
+        let is_refused = matches!(report, Err(StepError::Lacks { .. }));
+        if report.is_err() && !is_refused {
             self.failed = Some(frame.index);
             self.disarm("a plugin failed");
         }

@@ -3,7 +3,7 @@
 use nalgebra::Point2;
 use std::sync::Arc;
 
-use tagalong_core::{EgoMotion, Estimate, Frame, Funnel, Result};
+use tagalong_core::{EgoMotion, Estimate, Frame, Funnel, Input, Inputs, Result};
 use tagalong_stereo::StereoDepth;
 use tagalong_tracking::Guarded;
 use tagalong_tracking::{Preprocessed, Preprocessor};
@@ -25,6 +25,17 @@ impl Preprocessor for DepthOfPair {
         }
         let depth = self.0.depth(frame, funnel)?;
         Ok(Preprocessed { frame: Some(frame.with_depth(depth)), motion })
+    }
+
+    fn lacks(&self, frame: &Frame) -> Option<Input> {
+        if frame.holds(Input::Depth) {
+            return None;
+        }
+        [Input::Right, Input::Colour].into_iter().find(|input| !frame.holds(*input))
+    }
+
+    fn adds(&self) -> Inputs {
+        Inputs::NONE.accept(Input::Depth)
     }
 }
 

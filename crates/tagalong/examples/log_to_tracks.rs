@@ -6,8 +6,9 @@ use tagalong::prelude::*;
 fn main() -> Result<()> {
     let mut pipeline = Pipeline::builtin("depth-verified")?; // or from_toml_file
     for frame in Log::open("people.mcap")?.frames(&pipeline)? {
-        for track in pipeline.step(&frame?)?.tracks {
-            println!("{} at {:.2} m", track.id, track.position.coords.norm());
+        let tracks = pipeline.step(&frame?)?.tracks;
+        for track in tracks.iter().filter(|track| track.confirmed && track.seen) {
+            println!("{} at {:.2} m", track.id, track.position.xy().coords.norm());
         }
     }
     Ok(())

@@ -12,7 +12,7 @@ fn main() -> Result<()> {
         let stamp = Stamp::default().plus_seconds(0.1 * f64::from(count));
         let report = pipeline.step(frames.at(stamp).depth(depth_image()).frame()?)?;
         for track in report.tracks {
-            println!("{stamp} s: {} at {:.2} m", track.id, track.position.coords.norm());
+            println!("{stamp} s: {} at {:.2} m", track.id, track.position.xy().coords.norm());
         }
     }
     Ok(())

@@ -41,7 +41,7 @@ fn main() -> Result<()> {
         let stamp = Stamp::default().plus_seconds(0.1 * f64::from(count));
         let scan = LaserScan::of_points([[3.0 - 0.05 * f64::from(count), 0.5, 0.3].into()]);
         for track in pipeline.step(frames.at(stamp).laser(scan).frame()?)?.tracks {
-            println!("{stamp} s: {} at {:.2} m", track.id, track.position.coords.norm());
+            println!("{stamp} s: {} at {:.2} m", track.id, track.position.xy().coords.norm());
         }
     }
     Ok(())

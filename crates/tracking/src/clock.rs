@@ -46,6 +46,11 @@ impl Clock {
         Tick::Skip(outcome)
     }
 
+    /// Passes over a frame that is refused: the robot moved during it, too.
+    pub(crate) fn pass(&mut self, frame: &Frame) {
+        self.pending = Some(self.whole_motion(frame, &mut Funnel::default()));
+    }
+
     fn go(&mut self, stamp: Stamp, outcome: Outcome, motion: EgoMotion) -> Tick {
         let dt = self.last.map(|last| stamp.seconds_since(last)).filter(|dt| *dt > 0.0);
         self.last = Some(stamp);

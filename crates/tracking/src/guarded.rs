@@ -2,13 +2,25 @@ use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
-use tagalong_core::{Error, Frame, Result};
+use tagalong_core::{Error, Frame, Input, Result};
 
-/// Failure to process a frame. A pipeline that returned one is stopped.
+/// Failure to process a frame. A pipeline that returned one is stopped, except after
+/// [`StepError::Lacks`].
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StepError {
-    /// A plugin refused the frame, for example because the log lacks an image.
+    /// The frame lacks an input that a plugin or a stage requires. Nothing was done with it but to
+    /// note the robot's motion, and the pipeline takes the next frame.
+    #[error("frame {frame}: `{plugin}` needs {input}, which this frame does not have")]
+    Lacks {
+        /// The plugin or the stage.
+        plugin: String,
+        /// Index of the frame.
+        frame: u64,
+        /// The input.
+        input: Input,
+    },
+    /// A plugin refused the frame.
     #[error("frame {frame}: `{plugin}` {error}")]
     Plugin {
         /// The plugin.
@@ -59,9 +71,10 @@ impl StepError {
     /// Returns the index of the frame that failed.
     pub fn frame(&self) -> u64 {
         match self {
-            Self::Plugin { frame, .. } | Self::Panic { frame, .. } | Self::Stopped { frame } => {
-                *frame
-            }
+            Self::Lacks { frame, .. }
+            | Self::Plugin { frame, .. }
+            | Self::Panic { frame, .. }
+            | Self::Stopped { frame } => *frame,
         }
     }
 }

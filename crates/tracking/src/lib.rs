@@ -4,6 +4,7 @@
 //!
 //! | stage | module | decided by |
 //! |---|---|---|
+//! | frames without a required input refused | `needs` | the plugins |
 //! | stamps that jump | `clock` | [`ClockSettings`] |
 //! | tracks held, once the calibration changed | `frozen` | |
 //! | depth and motion completed | `preprocess` | each [`Preprocessor`] |
@@ -108,6 +109,7 @@ mod frozen;
 mod guarded;
 mod half_hidden;
 mod memo;
+mod needs;
 mod occlusion;
 mod preprocess;
 mod reidentification;

@@ -1,5 +1,5 @@
 use crate::{Guarded, StepError};
-use tagalong_core::{EgoMotion, Estimate, Frame, Funnel};
+use tagalong_core::{EgoMotion, Estimate, Frame, Funnel, Input, Inputs};
 
 use crate::stage::StageLog;
 
@@ -28,6 +28,17 @@ pub trait Preprocessor: Send {
         people: &[Estimate],
         funnel: &mut Funnel,
     ) -> tagalong_core::Result<Preprocessed>;
+
+    /// Returns an input that it needs of this very frame and that the frame does not have, if there
+    /// is one: the frame is refused.
+    fn lacks(&self, _: &Frame) -> Option<Input> {
+        None
+    }
+
+    /// Returns the inputs that it adds to frames without them.
+    fn adds(&self) -> Inputs {
+        Inputs::NONE
+    }
 }
 
 /// Takes a frame through all preprocessors; each receives the output of those before it.

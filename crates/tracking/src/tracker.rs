@@ -4,8 +4,8 @@ use crate::{Guarded, StepError};
 use nalgebra::Point2;
 use tagalong_core::{
     Associations, Associator, Detection, EgoMotion, Estimate, Evidence, Filter, Frame, Gate,
-    Initiation, Likelihood, Observation, ObservedTrack, Query, Track, TrackId, TrackManager,
-    Unassociated, Update, Verifier,
+    Initiation, Inputs, Likelihood, Observation, ObservedTrack, Query, Track, TrackId,
+    TrackManager, Unassociated, Update, Verifier,
 };
 use tagalong_vision::Describer;
 
@@ -16,6 +16,7 @@ use crate::duplicates::DuplicateFinder;
 use crate::frozen::held;
 use crate::half_hidden::inflate_half_hidden;
 use crate::memo::Identities;
+use crate::needs::Needs;
 use crate::occlusion::{
     Occluder, Visibility, occluder_of_detection, occluder_of_estimate, visibility,
 };
@@ -60,6 +61,7 @@ pub struct Tracker {
     associator: Guarded<dyn Associator>,
     filter: Guarded<dyn Filter>,
     manager: Guarded<dyn TrackManager>,
+    needs: Needs,
     clock: Clock,
     table: TrackTable,
     duplicates: DuplicateFinder,
@@ -95,7 +97,10 @@ impl Tracker {
         let Parts { preprocessors, detectors, verifiers, associator, filter, manager, describer } =
             parts;
         let requires_box = filter.plugin().requirements().image_box;
+        let mut needs = Needs::default();
+        needs.add(filter.name(), filter.plugin().requirements().inputs);
         Self {
+            needs,
             clock: Clock::new(settings.clock.clone()),
             reidentifier: Reidentifier::new(settings.reidentification.clone(), describer),
             settings,
@@ -118,9 +123,15 @@ impl Tracker {
     /// any: the tracks stay where they were on the floor, unseen, until the clock jumps.
     ///
     /// # Errors
-    /// [`StepError`] if a plugin fails or panics. The tracker cannot be used afterwards.
+    /// [`StepError::Lacks`] for a frame without a required input: the tracker goes on with the next.
+    /// Another [`StepError`] if a plugin fails or panics: the tracker cannot be used afterwards.
     pub fn step(&mut self, frame: &Frame) -> Result<Tracked, StepError> {
         let mut log = StageLog::new();
+        // No plugin sees a frame after the calibration changed.
+        if !(self.frozen || frame.calibration_changed) {
+            let checked = self.needs.check(frame, &self.preprocessors, &self.search, self.frames);
+            checked.inspect_err(|_| self.clock.pass(frame))?;
+        }
         let mut report = TrackingReport::new(frame.index, frame.stamp);
         let (outcome, motion) = match self.clock.tick(frame, &mut log.funnel) {
             Tick::Skip(outcome) => {
@@ -165,6 +176,11 @@ impl Tracker {
         move_boxes(frame, &mut report.tracks, &self.settings.silhouette);
         self.reported.clone_from(&report.tracks);
         Ok(Tracked { report, completed })
+    }
+
+    /// Requires inputs of each frame for a stage that the tracker does not know.
+    pub fn require(&mut self, stage: &str, inputs: Inputs) {
+        self.needs.add(stage, inputs);
     }
 
     /// Returns true once a frame had another calibration.

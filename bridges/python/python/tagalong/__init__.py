@@ -60,7 +60,7 @@ _BOXES = ["frame", "id", "x", "y", "width", "height", "score"]
 
 
 def main(arguments=None):
-    """Run the program `tagalong` and return its exit code.
+    """Run the program `tagalong` and return its exit code: 2 for wrong usage.
 
     arguments: those of the command line, without the program's name [default: sys.argv].
     """
@@ -78,6 +78,7 @@ def run(
     *,
     overlay=False,
     with_images=False,
+    smoothed=False,
     overwrite=False,
     strict=False,
     seed=None,
@@ -86,9 +87,10 @@ def run(
     """Run a pipeline over a log, as `tagalong run`, and return its report.json as a dict.
 
     config: a TOML file or the name of a built-in one; None takes the one for what the log has.
-    out: the folder of results, which must not exist without `overwrite`. With `strict` a log of
-    which something was lost raises TagalongError. `camera` names one of several cameras. Ctrl-C
-    stops the run; the files are whole then.
+    out: the folder of results, which must not exist without `overwrite`. `overlay` adds a picture
+    per frame, `with_images` the images to tracks.mcap (for Rerun and Foxglove), `smoothed` the file
+    tracks-smoothed.csv. With `strict` a log of which something was lost raises TagalongError.
+    `camera` names one of several cameras. Ctrl-C stops the run; the files are whole then.
     """
     _tagalong.run(
         config,
@@ -96,6 +98,7 @@ def run(
         out,
         overlay=overlay,
         with_images=with_images,
+        smoothed=smoothed,
         overwrite=overwrite,
         strict=strict,
         seed=seed,
@@ -120,7 +123,8 @@ def eval(
 
     truth: MOTChallenge text, people.csv, KITTI labels, or a log with truth. tracks: the folder of a
     run, tracks-metres.csv, MOTChallenge text or KITTI labels. similarity: "iou" of boxes, or
-    "metres" on the floor. log: the log of the truth, for its stamps. repairs: also return, as
+    "metres" on the floor. log: the log of the truth, for its stamps [default: that of the run, where it
+    was or beside the truth]. repairs: also return, as
     "repairs", HOTA, MOTA and IDF1 if one kind of error were repaired. drop_doubled_ids: keep the
     first person with an ID in each frame of the truth, where it is an error otherwise.
     """
@@ -138,15 +142,24 @@ def eval(
     )
 
 
-def read_tracks(path):
+def read_tracks(path, *, smoothed=False):
     """Read tracks as a dict of arrays, one per column and all of the same length.
 
     path: the folder of a run (tracks-metres.csv, and the boxes of tracks.csv as box_x, box_y,
     box_width, box_height, score; NaN where a track has no box), tracks-metres.csv, or MOTChallenge
-    text. `pandas.DataFrame(read_tracks(path))` is a table of it.
+    text. Rows with `seen` False are predicted: nothing was detected there. smoothed: of the folder of
+    a run, the boxes of tracks-smoothed.csv alone, with the IDs put right.
+    `pandas.DataFrame(read_tracks(path))` is a table of it.
     """
     path = _os.fspath(path)
     if not _os.path.isdir(path):
+        if smoothed:
+            raise ValueError(f"{path} is no folder of a run; smoothed tracks are in one")
+        return _columns(path)
+    if smoothed:
+        path = _os.path.join(path, "tracks-smoothed.csv")
+        if not _os.path.exists(path):
+            raise TagalongError(f"{path}: no such file; it is of run(..., smoothed=True)")
         return _columns(path)
     tracks = _columns(_os.path.join(path, "tracks-metres.csv"))
     boxes = _columns(_os.path.join(path, "tracks.csv"))

@@ -27,6 +27,7 @@ def run(
     *,
     overlay: bool = False,
     with_images: bool = False,
+    smoothed: bool = False,
     overwrite: bool = False,
     strict: bool = False,
     seed: Optional[int] = None,
@@ -43,4 +44,4 @@ def eval(
     repairs: bool = False,
     drop_doubled_ids: bool = False,
 ) -> dict[str, Any]: ...
-def read_tracks(path: _Path) -> dict[str, NDArray[Any]]: ...
+def read_tracks(path: _Path, *, smoothed: bool = False) -> dict[str, NDArray[Any]]: ...

@@ -1,6 +1,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use crate::origin::Origin;
 use crate::outcome::Failure;
 use crate::suggest::{is_run, runs_in};
 use serde::Deserialize;
@@ -16,6 +17,8 @@ pub struct Tracks {
     pub reports: Reports,
     /// Name of the log of a run, if the tracks are those of a run.
     pub log_name: Option<String>,
+    /// Place of that log, as the run names it, where it still is.
+    pub log_path: Option<PathBuf>,
     /// True if positions are in the robot frame.
     pub in_robot_frame: bool,
     /// Notes on lines that may have been read in another way than intended.
@@ -127,8 +130,15 @@ impl Tracks {
                 facts.ended
             ));
         }
-        Ok(Self { log_name: Some(facts.log.name), ..self })
+        Ok(Self { log_name: Some(facts.log.name), log_path: log_of(folder), ..self })
     }
+}
+
+/// Returns the path of the log of a run, a file or the folder of a recording, if it is there.
+fn log_of(run: &Path) -> Option<PathBuf> {
+    let text = read_text(&run.join("origin.json")).ok()?;
+    let origin: Origin = serde_json::from_str(&text).ok()?;
+    (!origin.log.as_os_str().is_empty() && origin.log.exists()).then_some(origin.log)
 }
 
 /// The text of a file, and the file's name for messages.

@@ -30,7 +30,7 @@ pub struct EvalArgs {
     #[arg(long, value_enum, default_value_t)]
     pub similarity: SimilarityChoice,
     /// The log of the truth, for stamps and the camera's pose [default: the one that the run names,
-    /// beside the truth].
+    /// where it was or beside the truth].
     #[arg(long, value_name = "LOG")]
     pub log: Option<PathBuf>,
     /// Read that log with the `[input]` and `[limits]` of this config.
@@ -267,6 +267,8 @@ fn shots(args: &EvalArgs, truth: &TruthFile, tracks: &Tracks) -> Result<Shots, F
     let found = args.log.clone().or_else(|| {
         if truth.is_in_log() {
             Some(args.truth.clone())
+        } else if tracks.log_path.is_some() {
+            tracks.log_path.clone()
         } else {
             beside(&args.truth, tracks.log_name.as_deref())
         }

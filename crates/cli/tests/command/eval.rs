@@ -208,6 +208,35 @@ fn a_log_that_is_not_beside_the_truth_can_be_named() {
     assert!(said.contains("HOTA"), "{said}");
 }
 
+/// The stamps of people.csv need it, wherever the truth is.
+#[test]
+fn the_log_that_a_run_names_is_found_where_it_was() {
+    let folder = home();
+    fs::create_dir(folder.path().join("truth")).expect("a folder");
+    let truth = folder.path().join("truth/mine.csv");
+    fs::rename(folder.path().join("walk.people.csv"), truth).expect("a move");
+    let files = ["--truth", "truth/mine.csv", "--tracks", "out", "--similarity", "metres"];
+    let said = results_of(&in_home(folder.path(), &files));
+    assert!(said.contains("HOTA"), "{said}");
+
+    // A log of several files is the folder of them.
+    let recording = folder.path().join("recording");
+    fs::create_dir(&recording).expect("a folder");
+    fs::rename(folder.path().join("walk.mcap"), recording.join("recording_0.mcap"))
+        .expect("a move");
+    let mut run = own_plugin();
+    run.current_dir(folder.path()).args(["run", "nearest.toml", "recording", "-o", "whole"]);
+    assert!(run.output().expect("a run").status.success());
+    let files = ["--truth", "truth/mine.csv", "--tracks", "whole", "--similarity", "metres"];
+    let of_folder = results_of(&in_home(folder.path(), &files));
+    assert_eq!(figures(&of_folder), figures(&said));
+}
+
+/// Returns the lines of a result that are no notes.
+fn figures(said: &str) -> Vec<&str> {
+    said.lines().filter(|line| !line.starts_with("note:")).collect()
+}
+
 #[test]
 fn mistakes_are_named_by_file_and_line() {
     let folder = home();

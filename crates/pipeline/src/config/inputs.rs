@@ -21,7 +21,7 @@ const CAMERA_MOTION: Inputs = Inputs::NONE.require(Input::Colour);
 /// Inputs of `[reidentification]`.
 const REIDENTIFICATION: Inputs = Inputs::NONE.accept(Input::Colour).accept(Input::Depth);
 /// Inputs of the network of `[appearance]`.
-const APPEARANCE: Inputs = Inputs::NONE.require(Input::Colour);
+pub(super) const APPEARANCE: Inputs = Inputs::NONE.require(Input::Colour);
 /// Inputs of `[stereo]`, which leaves a frame with depth unchanged.
 const STEREO: Inputs =
     Inputs::NONE.require(Input::Colour).require(Input::Right).accept(Input::Depth);
@@ -46,9 +46,7 @@ pub(super) fn declared_inputs(
     let steering = has_controller.then_some(("[collision_monitor]", STEERING));
     let remembers = settings.reidentification.remember_s > 0.0;
     let people = remembers.then_some(("[reidentification]", REIDENTIFICATION));
-    let compares = remembers || has_controller && settings.target.remember;
-    let described = settings.appearance.has_network() && compares;
-    let looks = described.then_some(("[appearance]", APPEARANCE));
+    let looks = describes(settings, has_controller).then_some(("[appearance]", APPEARANCE));
     let plugins = plugins.iter().copied();
     let mut all: Vec<Declared<'_>> =
         plugins.chain(odometry).chain(steering).chain(people).chain(looks).collect();
@@ -80,6 +78,13 @@ pub(super) fn declared_inputs(
     }
     let sum = all.into_iter().fold(Inputs::NONE, |sum, (_, inputs)| sum.union(inputs));
     Ok(settings.without.iter().fold(sum, |sum, input| sum.without(*input)))
+}
+
+/// Returns true if a network describes the people, by whom they are compared.
+pub(super) fn describes(settings: &PipelineSettings, has_controller: bool) -> bool {
+    let remembers = settings.reidentification.remember_s > 0.0;
+    let compares = remembers || has_controller && settings.target.remember;
+    settings.appearance.has_network() && compares
 }
 
 /// Returns true if the motion of the robot comes from images alone, without a scale. The collision

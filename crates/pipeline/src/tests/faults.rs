@@ -51,7 +51,7 @@ fn a_failed_pipeline_stays_stopped() {
 #[test]
 fn a_missing_image_is_named_with_who_needs_it() {
     let text = failure(&with("depth", "script")).to_string();
-    assert_eq!(text, "frame 1: `script` needs depth images, which this log does not carry");
+    assert_eq!(text, "frame 1: `script` needs depth images, which this frame does not have");
     assert!(failure(&with("fail", "choosy")).to_string().contains("`choosy` has no opinion"));
 }
 

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use tagalong_core::{
     Capabilities, DepthImage, Detection, Detector, Frame, Funnel, GreyImage, Images, Input, Inputs,
-    Query, Result, RgbImage, RightImage, Sensor,
+    Query, Reason, Result, RgbImage, RightImage, Sensor, WheelSpeeds,
 };
 
 use super::doubles::{Config, PLAIN, World, frame, person};
-use crate::{FrameReport, Pipeline};
+use crate::{FrameReport, Pipeline, StepError};
 
 fn world() -> World {
     World::of((0..6).map(|_| vec![person(3.0, 0.0)]))
@@ -56,7 +56,7 @@ fn an_image_that_nothing_declares_is_told_from_one_that_the_log_lacks() {
     assert!(undeclared.contains("`script` uses depth images without declaring"), "{undeclared}");
     assert!(undeclared.contains("Input::Depth"), "{undeclared}");
     let lacking = step(&frame(1, 0.1));
-    assert!(lacking.contains("which this log does not carry"), "{lacking}");
+    assert!(lacking.contains("which this frame does not have"), "{lacking}");
 }
 
 fn inputs(config: &str) -> Inputs {
@@ -104,6 +104,61 @@ fn stereo_replaces_depth_that_the_config_does_without() {
     assert!(report.funnel.entries().iter().any(|entry| entry.test.starts_with("stereo pixels: ")));
 }
 
+/// The tracks live on, and the motion of the robot during the refused frame is not lost.
+#[test]
+fn a_frame_without_a_required_input_is_refused_alone() {
+    fn moving(mut frame: Frame) -> Frame {
+        frame.motion.forward = 0.25;
+        frame
+    }
+
+    let world = world();
+    let mut pipeline = world.pipeline(&script("depth"));
+    let first = pipeline.step(moving(with_depth(1))).unwrap();
+    for index in [2, 3] {
+        let refused = pipeline.step(moving(frame(index, index as f64 * 0.1))).unwrap_err();
+        assert_eq!(
+            refused,
+            StepError::Lacks { plugin: "script".into(), frame: index, input: Input::Depth }
+        );
+    }
+    assert!(
+        world.asked.lock().unwrap().iter().all(|(_, index, _)| *index == 1),
+        "no plugin saw it"
+    );
+    let next = pipeline.step(moving(with_depth(4))).unwrap();
+    assert_eq!(next.tracks[0].id, first.tracks[0].id);
+    let predicted = world.predicted.lock().unwrap();
+    assert!((predicted[0].forward - 0.75).abs() < 1e-12 && (predicted[0].dt - 0.3).abs() < 1e-9);
+}
+
+#[test]
+fn a_refused_frame_gives_no_command_and_the_last_one_expires() {
+    let config = format!("{}\n[controller]\nplugin = 'drive'", script("depth"));
+    let mut pipeline = world().pipeline(&config);
+    let command = pipeline.step(with_depth(1)).unwrap().command.unwrap();
+    let late = command.valid_until.plus_seconds(0.01);
+    let refused = frame(2, late.seconds_since(frame(0, 0.0).stamp));
+    pipeline.step(refused).unwrap_err();
+    let stopped = pipeline.command_at(late).unwrap();
+    assert_eq!((stopped.wheels, stopped.reason), (WheelSpeeds::STOP, Reason::Expired));
+    let jumped = frame(3, 0.9).with_odometry_jump(true);
+    pipeline.step(jumped).unwrap_err();
+    assert_eq!(pipeline.fault(), Some("odometry jumped"), "also in a refused frame");
+}
+
+/// A detector that rests needs nothing, and neither does a pipeline after a change of calibration.
+#[test]
+fn only_what_a_frame_needs_is_required_of_it() {
+    let every = script("depth").replace("plugin = 'script'", "plugin = 'script'\nevery = 2");
+    let mut pipeline = world().pipeline(&every);
+    pipeline.step(with_depth(1)).unwrap();
+    pipeline.step(frame(2, 0.2)).unwrap();
+    assert!(pipeline.step(frame(3, 0.3)).is_err());
+    pipeline.step(frame(4, 0.4).with_changed_calibration(true)).unwrap();
+    pipeline.step(frame(5, 0.5)).unwrap();
+}
+
 /// Distances straight ahead, m, by a sensor that no crate but this one knows.
 struct Radar(Vec<f64>);
 
@@ -139,6 +194,6 @@ fn a_sensor_that_another_crate_defines_reaches_the_plugins_that_declare_it() {
     let report = pipeline.step(seen(1)).unwrap();
     assert_eq!(report.tracks[0].estimate.person.position.x, 2.5);
     let lacking = pipeline.step(frame(2, 0.2)).unwrap_err().to_string();
-    assert!(lacking.contains("radar, which this log does not carry"), "{lacking}");
+    assert!(lacking.contains("radar, which this frame does not have"), "{lacking}");
     assert!(seen(3).restricted_to(&inputs(PLAIN)).unwrap().sensor::<Radar>().is_err());
 }
