@@ -23,16 +23,12 @@ struct MadeWith {
     configs: BTreeMap<String, Vec<String>>,
 }
 
-/// Built-in model of a plugin.
+/// Built-in model of a plugin, or settings of it that were chosen with recordings.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Model {
-    /// Name of its card.
-    #[cfg_attr(
-        not(test),
-        expect(dead_code, reason = "for readers, and for the test of the cards")
-    )]
-    card: String,
+    /// Name of the card of a model; settings have none.
+    card: Option<String>,
     plugin: String,
     /// Settings that choose it among several.
     #[serde(default)]
@@ -41,11 +37,11 @@ struct Model {
 }
 
 impl Model {
-    /// Returns true for a plugin that has this model: it names none of its own.
+    /// Returns true for a plugin that has these settings, and, of a model, that names none of its own.
     fn is_of(&self, plugin: &str, config: &Table) -> bool {
         let own = config.get("model").and_then(Value::as_str).unwrap_or_default();
         let is_chosen = self.with.iter().all(|(key, value)| config.get(key) == Some(value));
-        self.plugin == plugin && own.is_empty() && is_chosen
+        self.plugin == plugin && is_chosen && (own.is_empty() || self.card.is_none())
     }
 }
 
@@ -175,6 +171,23 @@ mod tests {
         assert_eq!(names.len(), 6);
     }
 
+    /// The network is of others, and its place by the floor was chosen with six logs.
+    #[test]
+    fn settings_for_a_network_in_colour_are_those_of_the_logs_whatever_the_network() {
+        let table = table();
+        for (floor, sigma_distance, count) in [(true, 0.3, 6), (true, 0.2, 0), (false, 0.3, 0)] {
+            let mut config = Table::from_iter([("model".to_owned(), "own.onnx".into())]);
+            config.insert("floor".into(), floor.into());
+            config.insert("sigma_distance".into(), sigma_distance.into());
+            let mut part = Table::from_iter([("plugin".to_owned(), "onnx".into())]);
+            part.insert("config".into(), config.into());
+            let mut names = BTreeSet::new();
+            table.add_plugins(&Value::Table(part), &mut names);
+            assert_eq!(names.len(), count, "{floor} {sigma_distance}");
+            assert!(count == 0 || names.contains(&"TUD-Stadtmitte".to_owned()), "{names:?}");
+        }
+    }
+
     #[test]
     fn models_have_the_recordings_of_their_cards() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/models");
@@ -183,14 +196,16 @@ mod tests {
         for entry in std::fs::read_dir(folder).expect("models") {
             let path = entry.expect("a file").path();
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            let Some(name) = name.strip_suffix(".card.toml") else { continue };
+            let Some(name) = name.strip_suffix(".card.toml").map(ToOwned::to_owned) else {
+                continue;
+            };
             let card: Table =
                 toml::from_str(&std::fs::read_to_string(&path).expect("a card")).expect("a card");
             let sources = card.get("trained_on").and_then(Value::as_array);
             let mut logs: Vec<&str> = sources.into_iter().flatten().filter_map(log_of).collect();
             logs.sort_unstable();
             with_recordings += usize::from(!logs.is_empty());
-            let rows = table.models.iter().filter(|model| model.card == name);
+            let rows = table.models.iter().filter(|model| model.card.as_ref() == Some(&name));
             assert_eq!(rows.clone().count() == 0, logs.is_empty(), "{name}");
             for row in rows {
                 let mut recordings = row.recordings.clone();
