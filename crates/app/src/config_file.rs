@@ -14,6 +14,7 @@ use tagalong_pipeline::{BuildError, ConfigSource, Pipeline, ResolvedConfig};
 
 use crate::installed;
 use crate::outcome::Failure;
+use crate::recorded_boxes::RecordedBoxes;
 use crate::suggest::{config_hint, not_a_config};
 
 /// Config that is used where neither a config nor a log is given.
@@ -36,6 +37,9 @@ pub struct OuterSettings {
     /// `[output]`: contents of the output files.
     pub output: OutputSettings,
 }
+
+/// Place in the text of a config for the name of the log.
+const LOG_PLACE: &str = "{log}";
 
 impl ConfigFile {
     /// Reads a config: a file, the name of a built-in one, or that of an installed network.
@@ -92,6 +96,18 @@ impl ConfigFile {
     /// Returns the config with another text at the same path, so that it names the same files.
     pub fn with_text(&self, text: String) -> Self {
         Self { source: self.source.with_text(text) }
+    }
+
+    /// Returns true if its text has a place for the name of a log.
+    pub fn differs_by_log(&self) -> bool {
+        self.source.text().contains(LOG_PLACE)
+    }
+
+    /// Returns the config for a log: `{log}` in its text stands for the name of the log without ending.
+    #[must_use]
+    pub fn on_log(&self, log: &Path) -> Self {
+        let name = log.file_stem().unwrap_or_default().to_string_lossy();
+        self.with_text(self.source.text().replace(LOG_PLACE, &name))
     }
 
     /// Checks the values of `[tune]` by building the pipeline with each of them.
@@ -200,7 +216,8 @@ impl ConfigFile {
     }
 
     /// Returns a note for each list that replaces an inherited one whole: a reader who meant to change one
-    /// setting loses all others. The config that was written with an installed network means it.
+    /// setting loses all others; and on recorded boxes whose IDs are passed over. The config that was written
+    /// with an installed network means its lists.
     pub fn notes(&self) -> Result<Vec<String>, Failure> {
         let installed = installed::config_file(&self.stem());
         if installed.is_some_and(|path| path == self.source.path()) {
@@ -220,6 +237,7 @@ impl ConfigFile {
                  `{list}.0.config.KEY = VALUE`, counted from 0"
             ));
         }
+        notes.extend(RecordedBoxes::of(self).iter().filter_map(RecordedBoxes::note));
         Ok(notes)
     }
 

@@ -29,6 +29,7 @@ pub mod missed;
 pub mod origin;
 pub mod outcome;
 pub mod progress;
+pub mod recorded_boxes;
 pub mod remedies;
 pub mod scoring;
 pub mod serialize;

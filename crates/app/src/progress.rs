@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::outcome::say;
+use tagalong_math::counted;
 
 /// Time between two pictures of a spinner.
 const TICK: Duration = Duration::from_millis(100);
@@ -117,25 +118,34 @@ impl Forecast {
     /// Notes that a task is done; after one in twenty it says how long all will take, if that is
     /// more than a minute.
     pub fn advance(&self) {
-        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
-        let due = self.total.div_ceil(20);
-        if done < due || self.told.swap(done, Ordering::Relaxed) > 0 {
-            return;
-        }
-        if let Some(sentence) = sentence(done, self.total, self.start.elapsed(), self.kind) {
+        self.advance_by(1);
+    }
+
+    /// Notes that so many tasks are done, which ended together: their time is that of all of them.
+    pub fn advance_by(&self, count: usize) {
+        if let Some(sentence) = self.sentence_after(count, self.start.elapsed()) {
             say(&sentence);
         }
+    }
+
+    /// Counts tasks, and returns the forecast if it is due.
+    fn sentence_after(&self, count: usize, took: Duration) -> Option<String> {
+        let done = self.done.fetch_add(count as u64, Ordering::Relaxed) + count as u64;
+        let due = self.total.div_ceil(20).max(1);
+        if done < due || self.told.swap(done, Ordering::Relaxed) > 0 {
+            return None;
+        }
+        sentence(done, self.total, took, self.kind)
     }
 }
 
 /// Returns the forecast in words; none for less than a minute.
 fn sentence(done: u64, total: u64, took: Duration, kind: &str) -> Option<String> {
     let left = took.mul_f64(total.saturating_sub(done) as f64 / done.max(1) as f64);
-    let minutes = (left.as_secs_f64() / 60.0).ceil();
+    let minutes = counted((left.as_secs_f64() / 60.0).ceil() as u64, "minute");
     let seconds = took.as_secs_f64();
-    (left >= LONG).then(|| {
-        format!("{done} of {total} {kind} took {seconds:.0} s: about {minutes} minutes more")
-    })
+    (left >= LONG)
+        .then(|| format!("{done} of {total} {kind} took {seconds:.0} s: about {minutes} more"))
 }
 
 #[cfg(test)]
@@ -150,6 +160,17 @@ mod tests {
 
         assert_eq!(after(33).unwrap(), "20 of 384 tasks took 33 s: about 11 minutes more");
         assert_eq!(after(3), None);
+        assert_eq!(after(6).unwrap(), "20 of 384 tasks took 6 s: about 2 minutes more");
         assert_eq!(sentence(1, 1, Duration::from_secs(900), "tasks"), None);
+    }
+
+    #[test]
+    fn tasks_that_end_together_took_their_time_together() {
+        // One pass over a log for 12 of 24 tasks: as long again, not 23 times as long.
+        let forecast = Forecast::new(24, "tasks");
+        let told = forecast.sentence_after(12, Duration::from_secs(60));
+        assert_eq!(told.as_deref(), Some("12 of 24 tasks took 60 s: about 1 minute more"));
+        assert_eq!(forecast.sentence_after(12, Duration::from_secs(900)), None, "told once");
+        assert_eq!(Forecast::new(24, "tasks").sentence_after(12, Duration::from_secs(26)), None);
     }
 }

@@ -5,6 +5,7 @@ use clap::{Args, Subcommand};
 use tagalong_app::format::Format;
 
 use super::folder::FolderArgs;
+use super::foreign::ForeignTracks;
 pub use super::rooms::RoomsArgs;
 
 /// Arguments of `tagalong bench`.
@@ -81,6 +82,14 @@ pub struct PlanArgs {
     /// Every log with truth in this folder.
     #[arg(long, value_name = "DIR")]
     pub logs_dir: Option<PathBuf>,
+    /// Tracks of another program, scored beside the pipelines: a name, and a folder with LOG.txt or LOG.csv
+    /// for each log, in a format that `eval` reads.
+    #[arg(long, num_args = 1.., value_name = "NAME=DIR")]
+    pub tracks: Vec<ForeignTracks>,
+    /// The rooms of the logs, as for --leave-one-room-out: which logs are single frames or of one room,
+    /// and the frames that are not judged. Without --logs and --logs-dir all logs of the rooms.
+    #[arg(long, value_name = "ROOMS")]
+    pub rooms: Option<PathBuf>,
     /// Runs each pipeline with this many seeds, counted from that of its config.
     #[arg(long, value_name = "N", default_value_t = 1,
           value_parser = clap::value_parser!(u64).range(1..=1000))]
@@ -168,7 +177,7 @@ impl BenchArgs {
     pub fn of(configs: Vec<PathBuf>, logs: Vec<PathBuf>, output: PathBuf) -> Self {
         Self {
             step: None,
-            plan: PlanArgs { configs, logs, logs_dir: None, seeds: 1, drop_doubled_ids: false },
+            plan: PlanArgs { configs, logs, seeds: 1, ..PlanArgs::default() },
             run: RunArgs { jobs: 1, task: None, shard: None, retry_failed: false, timing: false },
             report: ReportArgs {
                 gate: GateArgs { baseline: None, fail_if: Vec::new() },

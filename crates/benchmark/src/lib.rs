@@ -22,9 +22,11 @@
 //! ```
 
 mod args;
+mod closing;
 pub mod experiments;
 mod export;
 mod folder;
+mod foreign;
 mod gate;
 mod made_with;
 mod misses;

@@ -10,6 +10,7 @@ use sha2::{Digest, Sha256};
 use tagalong_app::config_file::{ConfigFile, OuterSettings};
 use tagalong_app::misfit::{COMPARE, Traits, misfits_note};
 use tagalong_app::outcome::{Failure, say};
+use tagalong_app::recorded_boxes::RecordedBoxes;
 use tagalong_app::scoring::{TruthFile, files_of};
 use tagalong_app::suggest::{self, check_log_path, toml_files};
 use tagalong_config::{Registry, path_text};
@@ -20,7 +21,7 @@ use tagalong_math::counted;
 use tagalong_pipeline::{Suits, Tunable};
 
 use super::args::PlanArgs;
-use super::made_with;
+use super::{made_with, rooms};
 
 /// Prefix of the inputs that are files named by a config.
 const FILE: &str = "file ";
@@ -34,11 +35,20 @@ pub struct Task {
     pub hash: String,
     /// Name of the pipeline.
     pub pipeline: String,
-    /// Path of its config.
+    /// Path of its config, or of the tracks of another program.
     #[serde(with = "path_text")]
     pub config: PathBuf,
     /// Name of the log.
     pub log_name: String,
+    /// Name of the room of the log, where rooms were given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub room: Option<String>,
+    /// True if nothing is tracked over the frames of the log.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub single_frames: bool,
+    /// Frames of the log in which people are neither missed nor found.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub unjudged: Vec<u32>,
     /// Path of the log.
     #[serde(with = "path_text")]
     pub log: PathBuf,
@@ -84,6 +94,8 @@ pub struct PlannedConfig {
     suits: Suits,
     /// Hashes of the recordings with which its shipped models and settings were made.
     made_with: BTreeSet<String>,
+    /// True if it has the name of the log in it.
+    differs_by_log: bool,
 }
 
 impl PlannedConfig {
@@ -121,6 +133,47 @@ pub struct Annotated {
     pub drops_doubled_ids: bool,
     /// Frames in which people are neither missed nor found.
     pub unjudged: Vec<u32>,
+    /// Name of its room, where rooms were given.
+    pub room: Option<String>,
+    /// True if nothing is tracked over its frames.
+    pub single_frames: bool,
+}
+
+impl Annotated {
+    /// Returns the choices by which its truth is read, as text for a hash.
+    pub fn reading(&self) -> String {
+        let doubled = if self.drops_doubled_ids { "\nfirst of doubled ids" } else { "" };
+        let unjudged = if self.unjudged.is_empty() {
+            String::new()
+        } else {
+            format!("\nwithout {:?}", self.unjudged)
+        };
+        format!("\n{}{doubled}{unjudged}", self.whole_bodies)
+    }
+
+    /// Returns a task on it that lacks what the pipeline says.
+    pub fn task(&self) -> Task {
+        Task {
+            k: 0,
+            hash: String::new(),
+            pipeline: String::new(),
+            config: PathBuf::new(),
+            log_name: self.name.clone(),
+            room: self.room.clone(),
+            single_frames: self.single_frames,
+            unjudged: self.unjudged.clone(),
+            log: self.log.clone(),
+            truth: self.truth.clone(),
+            whole_bodies: self.whole_bodies,
+            drops_doubled_ids: self.drops_doubled_ids,
+            seed: 0,
+            inputs: BTreeMap::new(),
+            copy_of: self.copy_of.clone(),
+            made_with_log: false,
+            version: String::new(),
+            skip: None,
+        }
+    }
 }
 
 /// Plans a benchmark.
@@ -128,9 +181,15 @@ pub struct Annotated {
 /// # Errors
 /// Configs or logs that cannot be read, or two of the same name.
 pub fn plan(args: &PlanArgs, registry: &Registry) -> Result<Vec<Task>, Failure> {
-    let configs = configs(args, registry)?;
+    // A mistyped config should be told before long logs are read.
+    for path in &args.configs {
+        ConfigFile::read(path)?;
+    }
     let logs = logs(args)?;
-    unique("configs", configs.iter().map(|config| config.file.stem()))?;
+    let configs = configs(args, &logs[0].log, registry)?;
+    let foreign = args.tracks.iter().map(|tracks| tracks.name.clone());
+    let stems = configs.iter().map(|config| config.file.stem());
+    unique("configs or tracks", stems.chain(foreign))?;
     unique("logs", logs.iter().map(|log| log.name.clone()))?;
     let version = version()?;
     let mut tasks = Vec::new();
@@ -138,6 +197,13 @@ pub fn plan(args: &PlanArgs, registry: &Registry) -> Result<Vec<Task>, Failure> 
     for log in &logs {
         let mut tried: BTreeMap<String, Opened> = BTreeMap::new();
         for (config, unsuited) in configs.iter().zip(&mut unsuited) {
+            let own;
+            let config = if config.differs_by_log {
+                own = candidate_on(&config.path, Some(&log.log), registry)?;
+                &own
+            } else {
+                config
+            };
             let key = config.reading();
             // Opening a log is slow, so the answer is shared by configs that read it the same way.
             let opened = match tried.get(&key) {
@@ -157,6 +223,17 @@ pub fn plan(args: &PlanArgs, registry: &Registry) -> Result<Vec<Task>, Failure> 
                 (task.k, task.skip) = (tasks.len() + 1, skip.clone());
                 tasks.push(task);
             }
+        }
+        for tracks in &args.tracks {
+            tasks.push(Task { k: tasks.len() + 1, ..tracks.task(log, &version)? });
+        }
+    }
+    for config in &configs {
+        for boxes in RecordedBoxes::of(&config.file) {
+            let name = config.file.stem();
+            let logs = if config.differs_by_log { 1 } else { logs.len() };
+            let notes = [boxes.note(), boxes.note_on_logs(&name, logs)];
+            notes.iter().flatten().for_each(|note| say(&format!("note: {note}")));
         }
     }
     let names = configs.iter().map(|config| config.file.stem());
@@ -181,7 +258,7 @@ fn size(args: &PlanArgs, configs: usize, logs: usize, tasks: usize) -> String {
 /// # Errors
 /// If it, or its truth, changed since the task was planned.
 pub fn reread(task: &Task, registry: &Registry) -> Result<PlannedConfig, Failure> {
-    let candidate = candidate(&task.config, registry)?;
+    let candidate = candidate_on(&task.config, Some(&task.log), registry)?;
     let mut now = task.inputs.clone();
     // The file list is built anew: the config may name other files now.
     now.retain(|name, _| !name.starts_with(FILE));
@@ -234,24 +311,16 @@ fn task(
     ]);
     inputs.extend(files(config)?);
     // The hash names the result, so it covers the program and the seed as well.
-    let doubled = if log.drops_doubled_ids { "\nfirst of doubled ids" } else { "" };
-    let everything = format!("{version}\n{seed}\n{}\n{inputs:?}{doubled}", log.whole_bodies);
+    let everything = format!("{version}\n{seed}{}\n{inputs:?}", log.reading());
     Ok(Task {
-        k: 0,
         hash: sha256(everything.as_bytes())[..32].to_owned(),
         pipeline: config.file.stem(),
         config: config.path.clone(),
-        log_name: log.name.clone(),
-        log: log.log.clone(),
-        truth: log.truth.clone(),
-        whole_bodies: log.whole_bodies,
-        drops_doubled_ids: log.drops_doubled_ids,
         seed,
         inputs,
-        copy_of: log.copy_of.clone(),
         made_with_log: config.made_with.contains(log.copy_of.as_ref().unwrap_or(&log.sha256)),
         version: version.to_owned(),
-        skip: None,
+        ..log.task()
     })
 }
 
@@ -292,9 +361,15 @@ fn opened(config: &PlannedConfig, log: &Annotated) -> Result<Opened, Failure> {
     }
 }
 
-fn configs(args: &PlanArgs, registry: &Registry) -> Result<Vec<PlannedConfig>, Failure> {
+/// Returns the compared configs; those with the name of the log in it as they are for the first log.
+fn configs(
+    args: &PlanArgs,
+    first: &Path,
+    registry: &Registry,
+) -> Result<Vec<PlannedConfig>, Failure> {
     if !args.configs.is_empty() {
-        return args.configs.iter().map(|path| candidate(path, registry)).collect();
+        let named = args.configs.iter();
+        return named.map(|path| candidate_on(path, Some(first), registry)).collect();
     }
     // Outside of a clone those that need no file are compared.
     if toml_files(Path::new("configs")).is_empty() {
@@ -329,7 +404,21 @@ pub fn shipped(registry: &Registry) -> Result<Vec<PlannedConfig>, Failure> {
 /// # Errors
 /// Any mistake in it.
 pub fn candidate(path: &Path, registry: &Registry) -> Result<PlannedConfig, Failure> {
+    candidate_on(path, None, registry)
+}
+
+/// Reads a config as it is for a log.
+fn candidate_on(
+    path: &Path,
+    log: Option<&Path>,
+    registry: &Registry,
+) -> Result<PlannedConfig, Failure> {
     let file = ConfigFile::read(path)?;
+    let differs_by_log = file.differs_by_log();
+    let file = match log {
+        Some(log) => file.on_log(log),
+        None => file,
+    };
     let (pipeline, settings) = file.pipeline(registry, None)?;
     let outer = file.outer()?;
     let first_seed = settings.seed;
@@ -338,7 +427,17 @@ pub fn candidate(path: &Path, registry: &Registry) -> Result<PlannedConfig, Fail
     let inputs = pipeline.inputs();
     let made_with = made_with::recordings_of(&file, pipeline.config().values())?;
     let path = path.to_owned();
-    Ok(PlannedConfig { file, path, first_seed, outer, inputs, tune, suits, made_with })
+    Ok(PlannedConfig {
+        file,
+        path,
+        first_seed,
+        outer,
+        inputs,
+        tune,
+        suits,
+        made_with,
+        differs_by_log,
+    })
 }
 
 fn logs(args: &PlanArgs) -> Result<Vec<Annotated>, Failure> {
@@ -358,6 +457,10 @@ fn logs(args: &PlanArgs) -> Result<Vec<Annotated>, Failure> {
                 ));
             }
         }
+    }
+    if let Some(path) = &args.rooms {
+        let names_logs = !args.logs.is_empty() || args.logs_dir.is_some();
+        found = if names_logs { rooms::in_rooms(path, found) } else { rooms::of_rooms(path) }?;
     }
     found.iter_mut().for_each(|log| log.drops_doubled_ids = args.drop_doubled_ids);
     if found.is_empty() {
@@ -419,6 +522,8 @@ fn annotated(log: &Path) -> Result<Option<Annotated>, Failure> {
         whole_bodies,
         drops_doubled_ids: false,
         unjudged: Vec::new(),
+        room: None,
+        single_frames: false,
     }))
 }
 
@@ -473,22 +578,25 @@ fn hash_of_file(path: &Path) -> io::Result<String> {
 /// Returns a task of a pipeline on some log, for tests.
 #[cfg(test)]
 pub fn planned_for_tests(pipeline: &str) -> Task {
+    let log = Annotated {
+        log: "logs/hall.mcap".into(),
+        name: "hall".into(),
+        sha256: String::new(),
+        copy_of: None,
+        truth: "logs/hall.people.csv".into(),
+        truth_sha256: String::new(),
+        whole_bodies: false,
+        drops_doubled_ids: false,
+        unjudged: Vec::new(),
+        room: None,
+        single_frames: false,
+    };
     Task {
         k: 1,
         hash: pipeline.into(),
         pipeline: pipeline.into(),
         config: "a.toml".into(),
-        log_name: "hall".into(),
-        log: "logs/hall.mcap".into(),
-        truth: "logs/hall.people.csv".into(),
-        whole_bodies: false,
-        drops_doubled_ids: false,
-        seed: 0,
-        inputs: BTreeMap::new(),
-        copy_of: None,
-        made_with_log: false,
-        version: String::new(),
-        skip: None,
+        ..log.task()
     }
 }
 

@@ -12,7 +12,7 @@ use tagalong_report::{Benchmark, Outcome, TaskResult, Timings};
 use super::plan::Task;
 use super::store::{Store, Stored, StoredTiming};
 use super::work::blank;
-use super::{made_with, moments};
+use super::{closing, foreign, made_with, moments};
 
 /// Gathers the results of a plan.
 ///
@@ -25,7 +25,7 @@ pub fn gather(store: &Store) -> Result<Benchmark, Failure> {
     let mut missing = Vec::new();
     for task in &plan {
         match result(store, task) {
-            Some(stored) => all.push(stored),
+            Some(stored) => all.push(closing::with_facts(task, stored)),
             None => missing.push(task.k.to_string()),
         }
     }
@@ -74,6 +74,7 @@ fn notes(plan: &[Task], all: &[Stored]) -> Vec<String> {
     }
     let done = plan.iter().zip(all).filter(|(_, stored)| stored.result.outcome == Outcome::Done);
     notes.extend(made_with::notes(done.map(|(task, _)| task)));
+    notes.extend(closing::notes(plan, all));
     notes
 }
 
@@ -98,7 +99,8 @@ fn result(store: &Store, task: &Task) -> Option<Stored> {
 
 /// Returns the times, if those of all tasks were taken.
 fn timings(store: &Store, benchmark: &Benchmark) -> Option<Timings> {
-    let done = benchmark.tasks.iter().filter(|task| task.outcome == Outcome::Done);
+    let own = benchmark.tasks.iter().filter(|task| !task.inputs.contains_key(foreign::TRACKS));
+    let done = own.filter(|task| task.outcome == Outcome::Done);
     let all: Option<Vec<(String, StoredTiming)>> =
         done.map(|task| Some((task.hash.clone(), store.timing(&task.hash)?))).collect();
     let all = all?;
@@ -144,6 +146,8 @@ pub fn text(store: &Store, benchmark: &Benchmark) -> String {
             counted(benchmark.tasks.len(), "task"),
             names.join(", "),
         );
+    } else {
+        out += &closing::skipped(&benchmark.tasks);
     }
     for task in &benchmark.tasks {
         if task.image.is_some_and(|scores| scores.has_constant_scores()) {
@@ -160,6 +164,7 @@ pub fn text(store: &Store, benchmark: &Benchmark) -> String {
     for logs in &benchmark.copies {
         let _ = writeln!(out, "note: {}", tagalong_report::copies_note(logs));
     }
+    out += &closing::ranking(benchmark);
     let _ = writeln!(out, "report in {}", store.path("report.html").display());
     out
 }
@@ -206,7 +211,7 @@ fn table(tasks: &[&TaskResult]) -> String {
         let _ = match &task.outcome {
             Outcome::Done => writeln!(out, "{}", figures(task)),
             Outcome::Failed { why } => writeln!(out, "failed: {}", first_line(why)),
-            Outcome::Skipped { why } => writeln!(out, "skipped: {}", first_line(why)),
+            Outcome::Skipped { .. } => writeln!(out, "skipped"),
         };
     }
     out

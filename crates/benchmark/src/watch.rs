@@ -117,20 +117,35 @@ impl Watch {
         told: Option<(&Witness, Rules<'_>)>,
     ) -> Result<(TaskResult, Recording), String> {
         result.frames = self.frames;
-        result.duration_s = shots.duration_s();
         result.nis = consistency(&self.nis);
         let dropped = self.funnel.entries().iter();
         result.funnel =
             dropped.map(|d| Dropped { test: d.test.to_owned(), count: d.count }).collect();
         result.tracks = paths(self.paths, shots);
         let sequence = assemble(&result.log, truth, shots, self.reports, Rate(1.0));
-        result.truth = truth_paths(&sequence, shots);
-        score(&sequence, truth, told, &mut result)?;
-        let size = shots.at(1).map_or((0, 0), |shot| (shot.camera.width, shot.camera.height));
-        let width = size.0 as u32;
-        let height = size.1 as u32;
-        Ok((result, Recording { sequence, rate_hz: shots.rate_hz(), width, height }))
+        score_tracks(sequence, truth, shots, told, result)
     }
+}
+
+/// Scores truth and tracks side by side. `result` already names the task; causes as for
+/// [`Watch::score`].
+///
+/// # Errors
+/// Truth that contradicts itself, in a sentence.
+pub fn score_tracks(
+    sequence: Sequence,
+    truth: &TruthFile,
+    shots: &Shots,
+    told: Option<(&Witness, Rules<'_>)>,
+    mut result: TaskResult,
+) -> Result<(TaskResult, Recording), String> {
+    result.duration_s = shots.duration_s();
+    result.truth = truth_paths(&sequence, shots);
+    score(&sequence, truth, told, &mut result)?;
+    let size = shots.at(1).map_or((0, 0), |shot| (shot.camera.width, shot.camera.height));
+    let width = size.0 as u32;
+    let height = size.1 as u32;
+    Ok((result, Recording { sequence, rate_hz: shots.rate_hz(), width, height }))
 }
 
 /// Fills in figures and events, by boxes and by positions as far as the truth has them; the events

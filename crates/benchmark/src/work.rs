@@ -10,7 +10,7 @@ use tagalong_app::missed::{Depths, Rules, Witness};
 use tagalong_app::outcome::{Failure, say};
 use tagalong_app::progress::Forecast;
 use tagalong_app::remedies::Remedies;
-use tagalong_app::scoring::{Shot, Shots, TruthFile, TruthOptions, truth_notes};
+use tagalong_app::scoring::{RULES_HINT, Shot, Shots, TruthFile, TruthOptions, truth_notes};
 use tagalong_app::signals::Signals;
 use tagalong_app::unable::unable;
 use tagalong_config::Registry;
@@ -19,6 +19,7 @@ use tagalong_pipeline::{FrameReport, Pipeline};
 use tagalong_report::{Outcome, TaskResult};
 
 use super::args::{RunArgs, Shard};
+use super::foreign::{self, is_foreign};
 use super::pictures::Wanted;
 use super::plan::{PlannedConfig, Task, reread, version};
 use super::store::{Store, Stored, StoredTiming};
@@ -62,6 +63,7 @@ pub fn work(args: &RunArgs, store: &Store, registry: &Registry) -> Result<Tally,
         asked.iter().filter(|task| is_due(args, store, task)).cloned().collect();
     let ran = pending.len();
     let jobs = jobs(args);
+    let (foreign, pending): (Vec<Task>, Vec<Task>) = pending.into_iter().partition(is_foreign);
     let groups = groups(pending, registry, args.timing, jobs)?;
     let bar = bar(ran);
     let forecast = Forecast::new(ran, "tasks");
@@ -70,6 +72,7 @@ pub fn work(args: &RunArgs, store: &Store, registry: &Registry) -> Result<Tally,
     let desk =
         Desk { store, registry, signals: signals_of, bar: &bar, forecast: &forecast, timing };
     run_all(groups, jobs, &desk)?;
+    foreign::score_all(&foreign, store, &signals, |count| desk.count(count))?;
     bar.finish_and_clear();
     let mut tally =
         Tally { asked: asked.len(), ran, signal: signals.received(), ..Tally::default() };
@@ -127,7 +130,7 @@ fn keep_shard(tasks: &mut Vec<Task>, shard: Shard) {
 fn is_due(args: &RunArgs, store: &Store, task: &Task) -> bool {
     let Some(Stored { result, .. }) = store.result(task) else { return true };
     args.retry_failed && matches!(result.outcome, Outcome::Failed { .. })
-        || args.timing && store.timing(&task.hash).is_none()
+        || args.timing && !is_foreign(task) && store.timing(&task.hash).is_none()
 }
 
 /// Groups the tasks that see the same frames: of one log, read the same way. Tasks with other
@@ -249,21 +252,21 @@ impl Desk<'_> {
             if let (true, Some(timing)) = (self.timing, timing) {
                 self.store.put_timing(&ready.task.hash, &timing)?;
             }
-            self.bar.inc(1);
-            self.forecast.advance();
         }
+        self.count(group.len());
         Ok(())
+    }
+
+    /// Counts tasks as done, which end together.
+    fn count(&self, done: usize) {
+        self.bar.inc(done as u64);
+        self.forecast.advance_by(done);
     }
 
     /// Returns the results of a group, in its order; `None` after a stop signal.
     fn results(&self, group: &Group) -> Result<Option<Vec<Kept>>, String> {
         let first = &group[0].task;
-        let options = TruthOptions {
-            upper_body: first.whole_bodies,
-            drops_doubled_ids: first.drops_doubled_ids,
-            ..TruthOptions::default()
-        };
-        let truth = TruthFile::read(&first.truth, options).map_err(|failure| failure.message)?;
+        let truth = truth_of(first).map_err(|failure| failure.message)?;
         let mut source = open(&group[0], group[0].config.inputs)?;
         let lanes = group.iter().map(|ready| {
             Lane::new(|| {
@@ -303,8 +306,26 @@ impl Desk<'_> {
     }
 }
 
+/// Reads the truth of a task.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn truth_of(task: &Task) -> Result<TruthFile, Failure> {
+    let options = TruthOptions {
+        upper_body: task.whole_bodies,
+        drops_doubled_ids: task.drops_doubled_ids,
+        ..TruthOptions::default()
+    };
+    let truth = TruthFile::read(&task.truth, options).map_err(|failure| {
+        // Here is no option for it.
+        let message = failure.message.replace(RULES_HINT, " (by `--rules` of `eval`, not here)");
+        Failure { message, ..failure }
+    })?;
+    Ok(truth.without_judging(&task.unjudged))
+}
+
 /// Returns the notes on the truth of a log, without its folder: results are the same everywhere.
-fn notes_on(task: &Task, truth: &TruthFile, shots: &Shots) -> Vec<String> {
+pub fn notes_on(task: &Task, truth: &TruthFile, shots: &Shots) -> Vec<String> {
     let path = task.truth.display().to_string();
     let name = task.truth.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let log = task.log.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -314,7 +335,7 @@ fn notes_on(task: &Task, truth: &TruthFile, shots: &Shots) -> Vec<String> {
 }
 
 /// Result, and the times if the task succeeded.
-type Kept = (Stored, Option<StoredTiming>);
+pub type Kept = (Stored, Option<StoredTiming>);
 
 fn open(ready: &Ready, inputs: Inputs) -> Result<FrameSource, String> {
     let outer = &ready.config.outer;
@@ -412,7 +433,8 @@ pub fn blank(task: &Task) -> TaskResult {
     }
 }
 
-fn failed(task: &Task, why: &str) -> Kept {
+/// Returns the result of a task that failed.
+pub fn failed(task: &Task, why: &str) -> Kept {
     without_figures(task, Outcome::Failed { why: why.to_owned() })
 }
 

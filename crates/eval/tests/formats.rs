@@ -50,6 +50,10 @@ fn a_bad_line_is_named_with_what_was_expected() {
         ("1,1,1,x,1,1", "gt.txt, line 1: `y` is `x`, expected a finite number"),
         ("1,1,1,inf,1,1", "finite"),
         ("0,1,1,1,1,1", "numbered from 1"),
+        (
+            "\"frame\",\"id\",\"x\",\"y\",\"w\",\"h\"\n1,1,1,1,9,9\n",
+            "gt.txt, line 1: is a header: remove it",
+        ),
         ("1,1.5,1,1,1,1", "`id` is `1.5`, expected a whole number"),
     ] {
         let error = why(mot::parse(text, "gt.txt"));

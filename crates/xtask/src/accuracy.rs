@@ -71,8 +71,8 @@ pub fn sentence(name: &str, means: &str, rooms: &str) -> Result<String> {
     let recall = figure_of(name, means, "recall w/o")?;
     let off_m = figure_of(name, means, "off m w/o")?;
     Ok(format!(
-        "In single rooms, left out, the HOTA of `{name}` is {least:.3} to {most:.3}. It finds {:.1} % \
-         of the annotated people; these are {:.0} mm off on average.",
+        "In single rooms, left out, the HOTA of `{name}` is {least:.3} to {most:.3}. It finds people \
+         in {:.1} % of their frames, {:.0} mm off on average.",
         1e2 * recall,
         1e3 * off_m
     ))
@@ -154,8 +154,8 @@ mod tests {
                      | D, single frames | 0.1 |\n| mean | 0.9 |\n| mean, rooms alike | 0.8 |\n";
         assert_eq!(
             sentence("a", means, rooms).unwrap(),
-            "In single rooms, left out, the HOTA of `a` is 0.400 to 0.700. It finds 84.5 % of the \
-             annotated people; these are 37 mm off on average."
+            "In single rooms, left out, the HOTA of `a` is 0.400 to 0.700. It finds people in \
+             84.5 % of their frames, 37 mm off on average."
         );
         assert!(sentence("b", means, rooms).unwrap_err().to_string().contains("no row `b`"));
     }

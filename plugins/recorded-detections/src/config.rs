@@ -18,8 +18,8 @@ settings! {
     /// Settings of `recorded-detections`.
     pub struct Config {
         /// A `det.txt` of the MOTChallenge (frame, -1, x, y, width, height, score; frames from 1,
-        /// pixels), relative to the config. Empty: the log topic that `[input] detections_topic`
-        /// names.
+        /// pixels), relative to the config; for `run` and `bench` `{log}` in it is the name of the log
+        /// without its ending. Empty: the log topic that `[input] detections_topic` names.
         pub path: String,
         /// Boxes with a lower score, on the recorded scale, are dropped.
         pub min_score: f64 = 0.3,

@@ -52,6 +52,17 @@ pub fn log_of(truth: &str) -> Option<&str> {
     None
 }
 
+/// Endings of logs.
+const LOGS: [&str; 3] = ["mcap", "bag", "db3"];
+
+/// Returns the log beside a file of truth that is named after it.
+pub fn log_beside(truth: &Path) -> Option<PathBuf> {
+    let name = truth.file_name()?.to_string_lossy().into_owned();
+    let stem = log_of(&name)?;
+    let mut logs = LOGS.iter().map(|ending| truth.with_file_name(format!("{stem}.{ending}")));
+    logs.find(|log| log.is_file())
+}
+
 /// Returns the files in which the truth of a log may be, as `a.people.csv, a.boxes.csv`.
 pub fn files_of(log: &Path) -> String {
     let files = FORMS.iter().map(|form| log.with_extension(form.ending).display().to_string());
@@ -83,6 +94,10 @@ mod tests {
         }
         // The annotated file takes the place of all others.
         assert_eq!(file_beside(&log), Some((annotated_file(&log), false)));
+        assert_eq!(log_beside(&annotated_file(&log)), None);
+        std::fs::write(&log, "").expect("a file");
+        assert_eq!(log_beside(&annotated_file(&log)), Some(log.clone()));
+        assert_eq!(log_beside(&home.path().join("gt.txt")), None);
         assert_eq!([log_of("gt.txt"), log_of("people.csv")], [None; 2]);
     }
 }

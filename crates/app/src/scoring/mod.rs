@@ -2,6 +2,7 @@
 
 mod beside;
 mod extents;
+mod misread;
 mod other_log;
 mod shots;
 mod tracks;
@@ -13,15 +14,16 @@ use std::path::Path;
 
 use crate::outcome::Failure;
 use crate::suggest::file_hint;
-pub use beside::{annotated_file, files_of, is_of_whole_bodies};
-pub use extents::extents_note;
+pub use beside::{annotated_file, files_of, is_of_whole_bodies, log_beside};
+pub use extents::{as_upper_bodies, whole_bodies_in_truth};
+pub use misread::misread_notes;
 pub use other_log::{match_note, other_log_notes, truth_notes};
 pub use shots::{Shot, Shots};
 use tagalong_config::{FileLimit, read_text as read_bounded};
 use tagalong_eval::formats::{OddLines, kitti};
 use tagalong_eval::{Comparison, EvalError, Frame, Region, Report, Sequence, Similarity, Truth};
 pub use tracks::Tracks;
-pub use truth::{RulesChoice, TruthFile, TruthOptions};
+pub use truth::{RULES_HINT, RulesChoice, TruthFile, TruthOptions};
 
 /// Reports by the number of their frame, from 1.
 pub type Reports = BTreeMap<u32, Vec<Report>>;

@@ -3,15 +3,17 @@
 
 mod args;
 mod contest;
+mod facts;
 mod pairs;
 mod report;
 mod work;
 
 use std::path::Path;
 
-use crate::tuning::Rooms;
+use crate::tuning::{RoomFile, Rooms};
 pub use args::{HELP, RoomsArgs};
 use contest::{Contestant, Location};
+pub use facts::{in_rooms, of_rooms};
 use report::Report;
 use tagalong_app::format::TableFormat;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
@@ -63,12 +65,9 @@ fn locations(args: &RoomsArgs) -> Result<Vec<Location>, Failure> {
     for room in rooms.rooms {
         let mut logs = Vec::new();
         for log in &room.logs {
-            let annotated = check_log_path(&log.path).and_then(|()| plan::with_truth(&log.path));
-            let annotated = annotated.map_err(|failure| {
-                let error = ConfigError::new(failure.message).or_at(Some(log.place.clone()));
-                Failure::usage(error.render(&shown, &text))
-            })?;
-            logs.push(plan::Annotated { unjudged: room.unjudged(log).to_vec(), ..annotated });
+            let annotated =
+                with_truth(log).map_err(|error| Failure::usage(error.render(&shown, &text)))?;
+            logs.push(facts::with_facts(annotated, &room));
         }
         let models = room.models.into_iter().map(|(plugin, model)| {
             let path = std::path::absolute(&model.path).map_err(Failure::failed)?;
@@ -89,6 +88,12 @@ fn locations(args: &RoomsArgs) -> Result<Vec<Location>, Failure> {
         });
     }
     Ok(locations)
+}
+
+/// Returns a log that a file of rooms names, with its truth.
+fn with_truth(log: &RoomFile) -> Result<plan::Annotated, ConfigError> {
+    let annotated = check_log_path(&log.path).and_then(|()| plan::with_truth(&log.path));
+    annotated.map_err(|failure| ConfigError::new(failure.message).or_at(Some(log.place.clone())))
 }
 
 /// Returns the pipelines with all settings that are tried.

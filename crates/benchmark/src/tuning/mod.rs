@@ -11,4 +11,4 @@ mod rooms;
 
 pub use candidates::{Search, candidates, shipped, shown_value};
 pub use choice::{Choice, Figures, Objective, Poll, Weights, leave_one_out, mean, weighted_mean};
-pub use rooms::Rooms;
+pub use rooms::{Room, RoomFile, Rooms};

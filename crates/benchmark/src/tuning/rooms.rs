@@ -73,8 +73,7 @@ struct Entry {
 }
 
 impl Rooms {
-    /// Reads rooms. Paths of logs start at `folder` of the text, which starts at `base_dir`; or at
-    /// `logs_dir`, if there is one. Paths of models start at `base_dir`.
+    /// Reads rooms of which one is to be left out, so that two are needed; as [`Self::read`].
     ///
     /// # Errors
     /// The fault in the text, with its place.
@@ -83,6 +82,32 @@ impl Rooms {
         base_dir: &Path,
         logs_dir: Option<&Path>,
     ) -> Result<Self, ConfigError> {
+        let (read, whole) = Self::placed(text, base_dir, logs_dir)?;
+        if read.rooms.len() < FEWEST {
+            let message = format!("{} room: one is left out, so two are needed", read.rooms.len());
+            return Err(ConfigError::new(message).or_at(Some(whole)));
+        }
+        refuse_twins(&read.rooms)?;
+        Ok(read)
+    }
+
+    /// Reads rooms. Paths of logs start at `folder` of the text, which starts at `base_dir`; or at
+    /// `logs_dir`, if there is one. Paths of models start at `base_dir`.
+    ///
+    /// # Errors
+    /// The fault in the text, with its place.
+    pub fn read(text: &str, base_dir: &Path, logs_dir: Option<&Path>) -> Result<Self, ConfigError> {
+        let (read, _) = Self::placed(text, base_dir, logs_dir)?;
+        refuse_twins(&read.rooms)?;
+        Ok(read)
+    }
+
+    /// Reads rooms, and returns their place in the text.
+    fn placed(
+        text: &str,
+        base_dir: &Path,
+        logs_dir: Option<&Path>,
+    ) -> Result<(Self, Range<usize>), ConfigError> {
         let File { folder, rooms } = toml::from_str(text)?;
         let folder = logs_dir.map_or_else(|| base_dir.join(folder), Path::to_owned);
         let whole = rooms.span();
@@ -91,12 +116,7 @@ impl Rooms {
             .into_iter()
             .map(|(name, entry)| Room::read(name, entry, &folder, base_dir))
             .collect::<Result<_, _>>()?;
-        if rooms.len() < FEWEST {
-            let message = format!("{} room: one is left out, so two are needed", rooms.len());
-            return Err(ConfigError::new(message).or_at(Some(whole)));
-        }
-        refuse_twins(&rooms)?;
-        Ok(Self { rooms })
+        Ok((Self { rooms }, whole))
     }
 }
 
@@ -181,6 +201,15 @@ mod tests {
         let paths: Vec<&Path> = rooms[0].logs.iter().map(|log| log.path.as_path()).collect();
         assert_eq!(paths, [Path::new("home/logs/a1.mcap"), Path::new("home/logs/a2.mcap")]);
         assert_eq!(&TWO[rooms[1].logs[0].place.clone()], "\"b.mcap\"");
+    }
+
+    #[test]
+    fn one_room_is_enough_where_none_is_left_out() {
+        let one = "[rooms.A]\nlogs = ['a.mcap']";
+        let read = Rooms::read(one, Path::new("home"), None).expect("a room");
+        assert_eq!(read.rooms[0].logs[0].path, Path::new("home/a.mcap"));
+        let twins = "[rooms.A]\nlogs = ['a.mcap']\n[rooms.B]\nlogs = ['a.mcap']";
+        assert!(Rooms::read(twins, Path::new("home"), None).is_err());
     }
 
     #[test]

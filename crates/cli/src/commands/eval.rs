@@ -8,8 +8,9 @@ use tagalong_app::config_file::{ConfigFile, OuterSettings};
 use tagalong_app::format::Format;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print};
 use tagalong_app::scoring::{
-    Rate, RulesChoice, Shots, Tracks, TruthFile, TruthOptions, assemble, comparable, comparison,
-    extents_note, match_note, truth_notes, with_remedy,
+    Rate, RulesChoice, Shots, Tracks, TruthFile, TruthOptions, as_upper_bodies, assemble,
+    comparable, comparison, log_beside, match_note, misread_notes, truth_notes,
+    whole_bodies_in_truth, with_remedy,
 };
 use tagalong_app::serialize::to_json;
 use tagalong_app::suggest::check_log_path;
@@ -29,8 +30,13 @@ pub struct EvalArgs {
     /// Similarity measure: boxes in the image, or positions on the floor.
     #[arg(long, value_enum, default_value_t)]
     pub similarity: SimilarityChoice,
+<<<<<<< HEAD
     /// The log of the truth, for stamps and the camera's pose [default: the one that the run names,
     /// where it was or beside the truth].
+=======
+    /// The log of the truth, for stamps and the camera's pose [default: beside the truth, the one that the
+    /// run names, or after which the truth is named].
+>>>>>>> cmp
     #[arg(long, value_name = "LOG")]
     pub log: Option<PathBuf>,
     /// Read that log with the `[input]` and `[limits]` of this config.
@@ -117,8 +123,20 @@ impl Scored {
 }
 
 fn scored(args: &EvalArgs) -> Result<Scored, Failure> {
-    let Judged { sequence, truth, mut notes } = judged(args)?;
     let similarity = args.similarity.into();
+    let Judged { mut sequence, mut truth, mut notes } = judged(args, args.upper_body)?;
+    let mut kind = None;
+    if similarity == Similarity::Iou {
+        if let Some(note) = whole_bodies_in_truth(&sequence).filter(|_| !args.upper_body) {
+            Judged { sequence, truth, notes } = judged(args, true)?;
+            kind = Some(note);
+        } else if let Some((cut, note)) = as_upper_bodies(&sequence) {
+            sequence = cut;
+            kind = Some(note);
+        }
+    }
+    // Figures of other boxes than those of the files need their reason first.
+    notes.splice(0..0, kind);
     let reported = reports_of(&sequence);
     let Some(sequence) = comparable(&sequence, similarity) else {
         return Err(no_place(args, &truth));
@@ -130,14 +148,12 @@ fn scored(args: &EvalArgs) -> Result<Scored, Failure> {
     let scores = Scores::measure(&sequence, comparison).map_err(|error| refused(args, &error))?;
     let repairs = args.repairs.then(|| repairs(&sequence, &comparison));
     let repairs = repairs.transpose().map_err(|error| refused(args, &error))?;
-    let extents = match similarity {
-        Similarity::Iou => extents_note(&sequence, scores.recall),
-        Similarity::Metres => None,
-    };
-    // Boxes of another kind are reason enough that nothing matches.
-    let unmatched =
-        extents.or_else(|| match_note(&args.truth, scores.truths, scores.tp, scores.reports));
-    notes.extend(unmatched);
+    let mut misread = misread_notes(&sequence, &comparison);
+    // Another reading is reason enough that little matches.
+    if misread.is_empty() {
+        misread.extend(match_note(&args.truth, scores.truths, scores.tp, scores.reports));
+    }
+    notes.extend(misread);
     if scores.has_constant_scores() {
         notes.push(format!("{}: {CONSTANT_SCORES}", args.tracks.display()));
     }
@@ -203,12 +219,10 @@ struct Judged {
     notes: Vec<String>,
 }
 
-fn judged(args: &EvalArgs) -> Result<Judged, Failure> {
-    let options = TruthOptions {
-        rules: args.rules,
-        upper_body: args.upper_body,
-        drops_doubled_ids: args.drop_doubled_ids,
-    };
+/// Reads truth and tracks; with `upper_body` the truth's boxes are whole bodies, and cut.
+fn judged(args: &EvalArgs, upper_body: bool) -> Result<Judged, Failure> {
+    let options =
+        TruthOptions { rules: args.rules, upper_body, drops_doubled_ids: args.drop_doubled_ids };
     let mut truth = TruthFile::read(&args.truth, options)?;
     let tracks = Tracks::read(&args.tracks, truth.info.as_ref().map(|info| info.length))?;
     let shots = shots(args, &truth, &tracks)?;
@@ -288,9 +302,13 @@ fn shots(args: &EvalArgs, truth: &TruthFile, tracks: &Tracks) -> Result<Shots, F
     Shots::read(&log, &outer.input, &outer.limits)
 }
 
+/// Returns the log beside a truth: the one that the run names, or the one after which the truth is named.
 fn beside(truth: &Path, log_name: Option<&str>) -> Option<PathBuf> {
-    let path = truth.with_file_name(log_name?);
-    path.is_file().then_some(path)
+    if let Some(name) = log_name {
+        let path = truth.with_file_name(name);
+        return path.is_file().then_some(path);
+    }
+    log_beside(truth)
 }
 
 fn no_place(args: &EvalArgs, truth: &TruthFile) -> Failure {

@@ -125,6 +125,7 @@ impl Job {
             None if !args.has_log() => ConfigFile::built_in()?,
             None => choice::choose(args.log(), registry, &args.input)?,
         };
+        let config = config.on_log(args.log());
         let threads = args.threads.map(usize::from);
         let (mut pipeline, settings) = config.pipeline_on(registry, args.seed, threads)?;
         let outer = args.input.applied(config.outer_for(&pipeline)?);

@@ -482,3 +482,28 @@ fn doubled_ids_of_the_truth_are_dropped_if_asked_for() {
     let said = messages_of(&scored(track, truth, &["--drop-doubled-ids"]), 1);
     assert!(said.contains("tracks.txt: ") && !said.contains("`--drop"), "{said}");
 }
+
+#[test]
+fn frames_from_0_and_a_log_beside_the_truth_are_found() {
+    let folder = home();
+    let mut truth = String::from("frame,id,ub_x,ub_y,ub_w,ub_h\n");
+    let mut tracks = String::new();
+    for frame in 1..=20 {
+        truth += &format!("{frame},1,{},20,26,26\n", 6 * frame);
+        // Nobody is in the frame that is called 0.
+        if frame > 1 {
+            tracks += &format!("{},7,{},20,26,26,1\n", frame - 1, 6 * frame);
+        }
+    }
+    fs::write(folder.path().join("walk.people.csv"), truth).expect("a file");
+    fs::write(folder.path().join("tracks.txt"), &tracks).expect("a file");
+    let files = ["--truth", "walk.people.csv", "--tracks", "tracks.txt"];
+    let said = text(&in_home(folder.path(), &files).stdout);
+    assert!(!said.contains("frames a second are assumed"), "walk.mcap is beside its truth: {said}");
+    assert!(said.contains("with all frame numbers one higher"), "{said}");
+    fs::write(folder.path().join("tracks.txt"), format!("frame,id,x,y,w,h\n{tracks}"))
+        .expect("a file");
+    let refused = in_home(folder.path(), &files);
+    let said = text(&refused.stderr);
+    assert!(said.contains("tracks.txt, line 1: is a header: remove it"), "{said}");
+}

@@ -10,6 +10,7 @@ mod answers;
 mod bad_input;
 mod bench;
 mod blur;
+mod comparison;
 #[cfg(unix)]
 mod damaged;
 mod demo;

@@ -140,7 +140,20 @@ impl Row {
 ///
 /// A line with fewer than six fields, something that is no number, a frame below 1.
 pub fn parse(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
+    if let Some(first) = lines(text, file).next().filter(is_header) {
+        return Err(
+            first.error("is a header: remove it, MOTChallenge text begins with the first box")
+        );
+    }
     lines(text, file).map(|line| row(&line)).collect()
+}
+
+/// Returns true for names of columns: no field of boxes is a word.
+fn is_header(line: &Line<'_>) -> bool {
+    line.fields.len() > 1
+        && line.fields.iter().take(6).all(|field| {
+            field.starts_with(|first: char| first.is_alphabetic() || "\"#'".contains(first))
+        })
 }
 
 /// Reads truth; as [`parse`], but refuses the rows that TrackEval refuses.

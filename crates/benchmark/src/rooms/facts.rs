@@ -1,0 +1,65 @@
+//! Facts of a file of rooms for a benchmark without left-out rooms.
+
+use std::path::Path;
+
+use tagalong_app::outcome::{Failure, say};
+use tagalong_app::scoring::read_text;
+
+use super::with_truth;
+use crate::plan::Annotated;
+use crate::tuning::{Room, Rooms};
+
+/// Returns all logs of the rooms, with their truth and what the rooms say about them.
+///
+/// # Errors
+/// A file that cannot be read, or a log without truth; with its place in the file.
+pub fn of_rooms(path: &Path) -> Result<Vec<Annotated>, Failure> {
+    let (rooms, text) = read(path)?;
+    let shown = path.display().to_string();
+    let mut logs = Vec::new();
+    for room in &rooms.rooms {
+        for log in &room.logs {
+            let annotated =
+                with_truth(log).map_err(|error| Failure::usage(error.render(&shown, &text)))?;
+            logs.push(with_facts(annotated, room));
+        }
+    }
+    Ok(logs)
+}
+
+/// Adds what the rooms say about logs, by their names; says which are in no room.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn in_rooms(path: &Path, logs: Vec<Annotated>) -> Result<Vec<Annotated>, Failure> {
+    let (rooms, _) = read(path)?;
+    let mut known = Vec::new();
+    for log in logs {
+        let room = rooms.rooms.iter().find(|room| room.logs.iter().any(|l| l.name() == log.name));
+        match room {
+            Some(room) => known.push(with_facts(log, room)),
+            None => {
+                say(&format!("note: {} is in no room of {}", log.name, path.display()));
+                known.push(log);
+            }
+        }
+    }
+    Ok(known)
+}
+
+/// Returns a log with what its room says about it.
+pub fn with_facts(log: Annotated, room: &Room) -> Annotated {
+    let file = room.logs.iter().find(|file| file.name() == log.name);
+    let unjudged = file.map_or_else(Vec::new, |file| room.unjudged(file).to_vec());
+    let single_frames = room.single_frames;
+    Annotated { unjudged, room: Some(room.name.clone()), single_frames, ..log }
+}
+
+/// Reads the rooms, and returns them with their text.
+fn read(path: &Path) -> Result<(Rooms, String), Failure> {
+    let text = read_text(path).map_err(|failure| Failure::usage(failure.message))?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let rooms = Rooms::read(&text, folder, None)
+        .map_err(|error| Failure::usage(error.render(&path.display().to_string(), &text)))?;
+    Ok((rooms, text))
+}
