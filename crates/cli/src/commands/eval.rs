@@ -30,13 +30,8 @@ pub struct EvalArgs {
     /// Similarity measure: boxes in the image, or positions on the floor.
     #[arg(long, value_enum, default_value_t)]
     pub similarity: SimilarityChoice,
-<<<<<<< HEAD
     /// The log of the truth, for stamps and the camera's pose [default: the one that the run names,
-    /// where it was or beside the truth].
-=======
-    /// The log of the truth, for stamps and the camera's pose [default: beside the truth, the one that the
-    /// run names, or after which the truth is named].
->>>>>>> cmp
+    /// where it was or beside the truth, or after which the truth is named].
     #[arg(long, value_name = "LOG")]
     pub log: Option<PathBuf>,
     /// Read that log with the `[input]` and `[limits]` of this config.
