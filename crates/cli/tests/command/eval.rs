@@ -294,9 +294,9 @@ fn whole_bodies_can_be_compared_by_their_upper_bodies() {
     write(folder.path(), "whole.txt", "1,1,100,50,60,170,1,1,1\n");
     write(folder.path(), "upper.txt", "1,1,101.5,47.5,57,57,1,-1,-1,-1\n");
     let files = ["--truth", "whole.txt", "--tracks", "upper.txt", "--format", "json"];
-    let nothing = json(&in_home(folder.path(), &files));
-    assert_eq!(nothing["TP"].as_u64(), Some(0));
-    assert!(nothing["notes"].to_string().contains("whole bodies? --upper-body"), "{nothing}");
+    let told = json(&in_home(folder.path(), &files));
+    assert_eq!(told["TP"].as_u64(), Some(1));
+    assert!(told["notes"][0].to_string().contains("as with --upper-body"), "{told}");
     let upper = json(&in_home(folder.path(), &[&files[..], &["--upper-body"]].concat()));
     assert!((upper["MOTP"].as_f64().unwrap() - 1.0).abs() < 1e-9, "{upper}");
 }
