@@ -103,7 +103,7 @@ fn what_is_not_looked_at_more_closely_tells_its_cost_and_the_limits_that_let_it_
     let (found, funnel) = discover(DepthTemplateConfig::default(), &scene);
     let of_test = funnel.entries().iter().find(|entry| entry.test == "not refined");
     let places = of_test.map_or(&[][..], |entry| &entry.places);
-    let person = found[0].rect().unwrap();
+    let person = found[0].rect().expect("a box");
     for place in places {
         assert!(!person.contains(place.centre()), "{place:?} is at the person who was found");
     }
@@ -112,7 +112,7 @@ fn what_is_not_looked_at_more_closely_tells_its_cost_and_the_limits_that_let_it_
 #[test]
 fn a_silhouette_without_enough_readings_tells_their_part() {
     let scene = frame(320, 5.0, &[Point3::new(2.5, 0.0, 1.6)]);
-    let depth = scene.depth().unwrap();
+    let depth = scene.depth().expect("a depth image");
     let holes = DepthImage::from_fn(depth.width(), depth.height(), |x, y| {
         // Rows below the chin have no reading.
         let is_body = y > depth.height() / 3;
