@@ -151,6 +151,7 @@ mod tests {
             occluder: "0".into(),
             ignore: true,
             interpolated: 0,
+            proposed: String::new(),
         };
         // The camera looks along the robot's X from 1 m above the floor.
         let forward = Vector3::new(0.0, -1.0, 0.0);
