@@ -12,9 +12,10 @@ pub use crate::{Error, FrameMaker, Moment, Result};
 pub use tagalong_config::{Context, NoSettings, Registry};
 pub use tagalong_core::Result as PluginResult;
 pub use tagalong_core::{
-    Capabilities, Command, Controller, DepthImage, Detection, Detector, EgoMotion, Frame, Funnel,
-    GreyImage, Images, Input, Inputs, LaserScan, Query, Reason, RgbImage, Sensor, Stamp, Track,
-    TrackId, Twist, Verifier,
+    Associator, Capabilities, Command, Controller, DepthImage, Detection, Detector, EgoMotion,
+    Estimate, Filter, Frame, Funnel, GreyImage, Images, Input, Inputs, LaserScan, PerPerson,
+    PersonFilter, Query, Reason, RgbImage, Scene, Sensor, Stamp, Track, TrackId, TrackManager,
+    Twist, Verifier,
 };
 pub use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
 pub use tagalong_pipeline::{Choice, Enrollment, FrameReport, Outcome, Pipeline};

@@ -22,6 +22,7 @@ pub enum Kind {
     /// Estimates the states of people over time.
     Filter,
     /// Decides when tracks start, are confirmed, and end.
+    #[value(alias = "track-manager")]
     Manager,
     /// Steers after one of them.
     Controller,
@@ -96,12 +97,17 @@ pub fn format(workspace: &Workspace, name: &str) -> Result<()> {
 /// Returns the next steps with the new crate, in a few lines.
 pub fn what_now(kind: Kind, name: &str) -> String {
     let verb = kind.template().verb.0;
+    let tried = if kind == Kind::Controller {
+        format!("follow configs/{name}.toml configs/scenes/follow-passing.toml --seeds 1")
+    } else {
+        format!("run configs/{name}.toml LOG.mcap --overlay")
+    };
     format!(
         "plugins/{name} is written, listed in crates/catalog and used by configs/{name}.toml, which is built\n\
          in. Say in its first line for what it is to be taken.\n\
          Write the method in plugins/{name}/src/{verb}.rs, its settings in src/config.rs, then\n\
          \n    cargo test -p tagalong-{name} && cargo test -p tagalong-tests --test conformance\n    \
-         cargo run --release -- run configs/{name}.toml LOG.mcap --overlay\n"
+         cargo run --release -- {tried}\n"
     )
 }
 
