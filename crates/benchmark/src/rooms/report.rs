@@ -64,6 +64,9 @@ pub struct Fitted {
 /// Values of settings, by key.
 type Values = BTreeMap<String, toml::Value>;
 
+/// A figure of all.
+type Read = fn(&Figures) -> f64;
+
 #[derive(Serialize)]
 struct Skipped {
     log: String,
@@ -398,7 +401,7 @@ fn chosen_in(
 }
 
 /// Returns the least and the largest value of a figure.
-fn ends(figures: &[Figures], read: fn(&Figures) -> f64) -> [f64; 2] {
+fn ends(figures: &[Figures], read: Read) -> [f64; 2] {
     let values = figures.iter().map(read);
     [values.clone().fold(f64::INFINITY, f64::min), values.fold(f64::NEG_INFINITY, f64::max)]
 }
@@ -488,7 +491,7 @@ impl Fitted {
             return None;
         }
         let last = seed + self.by_sample.len() as u64 - 1;
-        let figures: [(&str, fn(&Figures) -> f64); 3] =
+        let figures: [(&str, Read); 3] =
             [("HOTA", |f| f.hota), ("IDF1", |f| f.idf1), ("MOTA", |f| f.mota)];
         let words = figures.map(|(title, read)| {
             let [least, most] = ends(&self.by_sample, read);
