@@ -64,7 +64,7 @@ pub struct Fitted {
 /// Values of settings, by key.
 type Values = BTreeMap<String, toml::Value>;
 
-/// A figure of all.
+/// Reads one of the figures.
 type Read = fn(&Figures) -> f64;
 
 #[derive(Serialize)]
