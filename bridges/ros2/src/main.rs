@@ -1,5 +1,6 @@
 //! The `tagalong-ros2` command.
 
+use std::io::Write as _;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -42,7 +43,8 @@ fn main() -> ExitCode {
 fn check(options: &Options) -> ExitCode {
     match options.checked(&tagalong::builtin_registry()) {
         Ok(lines) => {
-            print!("{lines}");
+            // A pipe that nobody reads any more is no fault of the config.
+            let _closed = write!(std::io::stdout(), "{lines}");
             ExitCode::SUCCESS
         }
         Err(error) => {
