@@ -295,8 +295,8 @@ fn the_plans_of_a_log_without_truth_are_folded_and_take_no_room_from_others() {
 /// The logs whose plans are open.
 fn open_plans(benchmark: &Benchmark) -> Vec<String> {
     let page = html(benchmark, None);
-    let plans = page.split("<section id=\"floor\"").nth(1).expect("the plans");
-    let plans = plans.split("</section>").next().expect("their end");
+    let plans = page.split("<section id=\"floor\"").nth(1).unwrap();
+    let plans = plans.split("</section>").next().unwrap();
     let open = plans.split("<details class=\"print\" open><summary>").skip(1);
     open.filter_map(|rest| rest.split('<').next()).map(ToOwned::to_owned).collect()
 }

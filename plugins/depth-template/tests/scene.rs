@@ -76,8 +76,8 @@ fn the_centre_of_the_head_is_as_far_behind_its_surface_as_told() {
 /// Returns the least cost above the limit of looking closer, with the settings that it breaks.
 fn least_unrefined(funnel: &Funnel) -> Measured {
     let of_test = funnel.entries().iter().find(|entry| entry.test == "not refined");
-    let measured = of_test.expect("cells that are not refined").measured.iter().map(|one| &one.1);
-    measured.min_by(|a, b| a.value.total_cmp(&b.value)).expect("a measured one").clone()
+    let measured = of_test.unwrap().measured.iter().map(|one| &one.1);
+    measured.min_by(|a, b| a.value.total_cmp(&b.value)).unwrap().clone()
 }
 
 #[test]
