@@ -77,7 +77,7 @@ pub(crate) struct BridgeStatus {
     pub(crate) follow: Option<FollowStatus>,
     /// Permission of the deadman's switch to move, in words.
     pub(crate) permission: Option<&'static str>,
-    /// What keeps the robot from being enabled, in words: nobody publishes the enable.
+    /// Cause that keeps the robot from being enabled, in words: nobody publishes the enable.
     pub(crate) note: Option<String>,
     /// Frames that the pipeline processed.
     pub(crate) frames: u64,
@@ -96,7 +96,7 @@ pub(crate) struct Health {
     pub(crate) ok: bool,
     /// Cause if not.
     pub(crate) reason: Option<String>,
-    /// What keeps the robot from being enabled, in words.
+    /// Cause that keeps the robot from being enabled, in words.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) note: Option<String>,
 }
@@ -152,7 +152,7 @@ impl Desk {
         (shared.follow, shared.frames, shared.frame) = (follow, frames, Some(Instant::now()));
     }
 
-    /// Sets the state after a turn of the loop, and after a request; `note` says what keeps the robot
+    /// Sets the state after a turn of the loop, and after a request; `note` is the cause that keeps the robot
     /// from being enabled.
     pub(crate) fn turn(
         &self,

@@ -120,7 +120,7 @@ impl Person {
         let region = between(&old.region, &new.region, share);
         // The notes hold until the next key changes them.
         let mut notes = Key { visible_body: None, head_in_camera_m: None, ..old.clone() };
-        // What lies between two keys is reviewed if both of them are.
+        // The frames between two keys are reviewed if both of them are.
         if notes.proposed.is_empty() {
             notes.proposed.clone_from(&new.proposed);
         }

@@ -21,7 +21,9 @@ use tagalong_math::counted;
 use tagalong_pipeline::{Suits, Tunable};
 
 use super::args::PlanArgs;
-use super::{made_with, rooms};
+use super::made_with;
+
+pub mod facts;
 
 /// Prefix of the inputs that are files named by a config.
 const FILE: &str = "file ";
@@ -460,7 +462,7 @@ fn logs(args: &PlanArgs) -> Result<Vec<Annotated>, Failure> {
     }
     if let Some(path) = &args.rooms {
         let names_logs = !args.logs.is_empty() || args.logs_dir.is_some();
-        found = if names_logs { rooms::in_rooms(path, found) } else { rooms::of_rooms(path) }?;
+        found = if names_logs { facts::in_rooms(path, found) } else { facts::of_rooms(path) }?;
     }
     found.iter_mut().for_each(|log| log.drops_doubled_ids = args.drop_doubled_ids);
     if found.is_empty() {

@@ -210,7 +210,7 @@ fn a_newcomer_inherits_the_id_that_another_person_had_last() {
     assert_eq!(wrong_ids(&[left, empty, came, came, empty, came]), (0, 1));
     // Person 1 has it again: inherited from person 2, and no switch, as 7 is the last ID of both.
     assert_eq!(wrong_ids(&[left, came, left]), (0, 2));
-    // A person who comes back with the own ID, or a newcomer with a new one, has inherited nothing.
+    // A person with the own ID of before, or a newcomer with a new one, has inherited nothing.
     assert_eq!(wrong_ids(&[left, empty, left]), (0, 0));
     assert_eq!(wrong_ids(&[left, empty, (&[(2, 5.0)], &[(8, 5.0)])]), (0, 0));
     // An ID that was on nobody belongs to nobody.
@@ -223,7 +223,7 @@ fn two_people_who_swap_their_ids_inherit_both() {
     let before: (Places<'_>, Places<'_>) = (people, &[(7, 0.0), (8, 5.0)]);
     let after: (Places<'_>, Places<'_>) = (people, &[(8, 0.0), (7, 5.0)]);
     assert_eq!(wrong_ids(&[before, after, after]), (2, 2));
-    // Person 2 alone takes over the ID of person 1, who is not found any more.
+    // Person 2 alone takes over the ID of person 1, not found any more.
     assert_eq!(wrong_ids(&[before, (people, &[(7, 5.0)])]), (1, 1));
     // A new ID is a switch and was nobody's.
     assert_eq!(wrong_ids(&[before, (people, &[(9, 0.0), (8, 5.0)])]), (1, 0));

@@ -12,7 +12,7 @@ pub struct OverlayStyle {
     pub detail: Detail,
     /// Part of a person that boxes enclose.
     pub boxes: BoxedPart,
-    /// Reach of the plan ahead of the robot, m; less than [`LEAST_REACH_M`] is that.
+    /// Reach of the plan ahead of the robot, m; at least 8.
     pub reach_m: u16,
 }
 

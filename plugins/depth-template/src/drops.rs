@@ -1,4 +1,4 @@
-//! What one scan drops: counts of all places, and some of them with what was measured there.
+//! Places that one scan drops: counts of all places, and some of them with the values measured there.
 
 use tagalong_core::{Funnel, Measured};
 
@@ -44,7 +44,7 @@ pub struct Place {
     pub y: i64,
     /// Depth of the face, m.
     pub depth_m: f64,
-    /// What was measured there.
+    /// Values that were measured there.
     pub measured: Option<Measured>,
 }
 

@@ -198,7 +198,7 @@ impl Witness {
         Cause { text, ..cause }
     }
 
-    /// Returns the test that dropped the best candidate, else what was measured at the place; and the
+    /// Returns the test that dropped the best candidate, else the values at the place; and the
     /// sentence about this person alone.
     fn dropped_or_measured(
         &self,

@@ -3,27 +3,24 @@
 
 mod args;
 mod contest;
-mod facts;
 mod pairs;
 mod report;
 mod work;
 
 use std::path::Path;
 
-use crate::tuning::{RoomFile, Rooms};
+use crate::tuning::Rooms;
 pub use args::{HELP, RoomsArgs};
 use contest::{Contestant, Location};
-pub use facts::{in_rooms, of_rooms};
 use report::Report;
 use tagalong_app::format::TableFormat;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, say};
 use tagalong_app::scoring::read_text;
-use tagalong_app::suggest::check_log_path;
 use tagalong_config::{ConfigError, Registry};
 use tagalong_math::counted;
 use work::Desk;
 
-use super::plan;
+use super::plan::{self, facts};
 use super::store::Store;
 
 /// Runs the whole procedure and prints the tables.
@@ -66,7 +63,7 @@ fn locations(args: &RoomsArgs) -> Result<Vec<Location>, Failure> {
         let mut logs = Vec::new();
         for log in &room.logs {
             let annotated =
-                with_truth(log).map_err(|error| Failure::usage(error.render(&shown, &text)))?;
+                facts::of_file(log).map_err(|error| Failure::usage(error.render(&shown, &text)))?;
             logs.push(facts::with_facts(annotated, &room));
         }
         let models = room.models.into_iter().map(|(plugin, model)| {
@@ -88,12 +85,6 @@ fn locations(args: &RoomsArgs) -> Result<Vec<Location>, Failure> {
         });
     }
     Ok(locations)
-}
-
-/// Returns a log that a file of rooms names, with its truth.
-fn with_truth(log: &RoomFile) -> Result<plan::Annotated, ConfigError> {
-    let annotated = check_log_path(&log.path).and_then(|()| plan::with_truth(&log.path));
-    annotated.map_err(|failure| ConfigError::new(failure.message).or_at(Some(log.place.clone())))
 }
 
 /// Returns the pipelines with all settings that are tried.

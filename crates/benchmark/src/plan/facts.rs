@@ -4,10 +4,11 @@ use std::path::Path;
 
 use tagalong_app::outcome::{Failure, say};
 use tagalong_app::scoring::read_text;
+use tagalong_app::suggest::check_log_path;
+use tagalong_config::ConfigError;
 
-use super::with_truth;
-use crate::plan::Annotated;
-use crate::tuning::{Room, Rooms};
+use super::{Annotated, with_truth};
+use crate::tuning::{Room, RoomFile, Rooms};
 
 /// Returns all logs of the rooms, with their truth and what the rooms say about them.
 ///
@@ -20,7 +21,7 @@ pub fn of_rooms(path: &Path) -> Result<Vec<Annotated>, Failure> {
     for room in &rooms.rooms {
         for log in &room.logs {
             let annotated =
-                with_truth(log).map_err(|error| Failure::usage(error.render(&shown, &text)))?;
+                of_file(log).map_err(|error| Failure::usage(error.render(&shown, &text)))?;
             logs.push(with_facts(annotated, room));
         }
     }
@@ -53,6 +54,15 @@ pub fn with_facts(log: Annotated, room: &Room) -> Annotated {
     let unjudged = file.map_or_else(Vec::new, |file| room.unjudged(file).to_vec());
     let single_frames = room.single_frames;
     Annotated { unjudged, room: Some(room.name.clone()), single_frames, ..log }
+}
+
+/// Returns a log that a file of rooms names, with its truth.
+///
+/// # Errors
+/// A log that cannot be read or has no truth, with its place in the file.
+pub fn of_file(log: &RoomFile) -> Result<Annotated, ConfigError> {
+    let annotated = check_log_path(&log.path).and_then(|()| with_truth(&log.path));
+    annotated.map_err(|failure| ConfigError::new(failure.message).or_at(Some(log.place.clone())))
 }
 
 /// Reads the rooms, and returns them with their text.
