@@ -87,7 +87,7 @@ impl PyPipeline {
     /// infinite without a pose]. detections: those of a detector of your own, for a config with the
     /// plugin `recorded-detections` ("recorded"): rows of x, y, width, height, score, pixels of the
     /// camera's image, or of x, y, z, score, the centre of the head in the robot frame, m; [] where
-    /// it found nobody, None where it did not run.
+    /// it found no person, None where it did not run.
     #[pyo3(signature = (colour, depth, camera, pose, stamp, *, scan=None, scan_stamp=None, right=None,
         baseline_m=None, index=None, odometry_age_s=None, detections=None))]
     #[allow(clippy::too_many_arguments, reason = "they are the keywords of a Python method")]

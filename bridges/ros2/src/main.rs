@@ -43,7 +43,7 @@ fn main() -> ExitCode {
 fn check(options: &Options) -> ExitCode {
     match options.checked(&tagalong::builtin_registry()) {
         Ok(lines) => {
-            // A pipe that nobody reads any more is no fault of the config.
+            // A pipe without a reader is no fault of the config.
             let _closed = write!(std::io::stdout(), "{lines}");
             ExitCode::SUCCESS
         }

@@ -77,7 +77,7 @@ pub(crate) struct BridgeStatus {
     pub(crate) follow: Option<FollowStatus>,
     /// Permission of the deadman's switch to move, in words.
     pub(crate) permission: Option<&'static str>,
-    /// Cause that keeps the robot from being enabled, in words: nobody publishes the enable.
+    /// Cause that keeps the robot from being enabled, in words: the enable has no publisher.
     pub(crate) note: Option<String>,
     /// Frames that the pipeline processed.
     pub(crate) frames: u64,

@@ -24,7 +24,7 @@ pub struct Key {
     pub head_in_camera_m: Option<[f64; 3]>,
     /// Origin of that place, as the file has it.
     pub interpolated: u8,
-    /// Pipeline that proposed the box, until somebody reviews it; empty then, and for boxes set by hand.
+    /// Pipeline that proposed the box, until it is reviewed; empty then, and for boxes set by hand.
     pub proposed: String,
 }
 

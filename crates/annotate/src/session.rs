@@ -18,7 +18,7 @@ use crate::film::{Film, Place};
 use crate::person::{Key, Person, tenths};
 
 /// A person in a frame, as the page takes it: frame, box, then 1 for a key, 1 for ignored, the
-/// visible fraction, the distance, m, or null, and 1 for a proposed box that nobody reviewed.
+/// visible fraction, the distance, m, or null, and 1 for a proposed box that is not reviewed.
 type PageRow = (u32, [f64; 4], u8, u8, f64, Option<f64>, u8);
 
 /// Answer to a change, and the state at the beginning.

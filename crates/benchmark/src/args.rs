@@ -5,7 +5,6 @@ use clap::{Args, Subcommand};
 use tagalong_app::format::Format;
 
 use super::folder::FolderArgs;
-use super::foreign::ForeignTracks;
 pub use super::rooms::RoomsArgs;
 
 /// Arguments of `tagalong bench`.
@@ -193,5 +192,26 @@ impl BenchArgs {
     pub fn with_note(mut self, note: String) -> Self {
         self.report.notes.push(note);
         self
+    }
+}
+
+/// Tracks of another program on all logs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ForeignTracks {
+    /// Name in tables.
+    pub name: String,
+    /// Folder with a file for each log, named after it.
+    pub folder: PathBuf,
+}
+
+impl FromStr for ForeignTracks {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (name, folder) = text.split_once('=').unwrap_or_default();
+        if name.is_empty() || folder.is_empty() {
+            return Err("expected NAME=DIR, for example bytetrack=tracks/bytetrack".into());
+        }
+        Ok(Self { name: name.to_owned(), folder: folder.into() })
     }
 }

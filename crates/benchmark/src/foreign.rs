@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 use tagalong_app::outcome::Failure;
 use tagalong_app::scoring::{
@@ -14,6 +13,7 @@ use tagalong_eval::{Clear, Prepared, Role, Sequence, Similarity};
 use tagalong_log::{InputSettings, Limits};
 use tagalong_report::{MissedPerson, TaskResult};
 
+use super::args::ForeignTracks;
 use super::plan::{Annotated, Task, sha256, sha256_of_file};
 use super::store::{Store, Stored};
 use super::watch::{repaired, score_tracks};
@@ -26,27 +26,6 @@ pub const TRACKS: &str = "tracks";
 /// Cause of all misses of another program, and the sentence about it.
 const CAUSE: &str = "tracks of another program";
 const WHY: &str = "of tracks of another program no dropped candidates are known";
-
-/// Tracks of another program on all logs.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ForeignTracks {
-    /// Name in tables.
-    pub name: String,
-    /// Folder with a file for each log, named after it.
-    pub folder: PathBuf,
-}
-
-impl FromStr for ForeignTracks {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let (name, folder) = text.split_once('=').unwrap_or_default();
-        if name.is_empty() || folder.is_empty() {
-            return Err("expected NAME=DIR, for example bytetrack=tracks/bytetrack".into());
-        }
-        Ok(Self { name: name.to_owned(), folder: folder.into() })
-    }
-}
 
 impl ForeignTracks {
     /// Returns the task of scoring the tracks on a log.

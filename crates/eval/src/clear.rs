@@ -38,7 +38,7 @@ pub struct Clear {
     pub id_switches: u64,
     /// Matches of a truth with a track whose last match was another truth: the truth has inherited an
     /// ID. Two truths that swap their tracks are two switches and two of these; a new person with the
-    /// ID of one who left is one of these and no switch. TrackEval has no such figure.
+    /// ID of a person that left is one of these and no switch. TrackEval has no such figure.
     #[serde(default)]
     pub inherited_ids: u64,
     /// Interruptions: the number of times that a truth was found again after a pause. As in

@@ -201,7 +201,7 @@ fn wrong_ids(frames: &[(Places<'_>, Places<'_>)]) -> (u64, u64) {
 
 #[test]
 fn a_newcomer_inherits_the_id_that_another_person_had_last() {
-    // Person 1 leaves, nobody is there for a frame, and person 2 comes in elsewhere with the ID.
+    // Person 1 leaves, a frame is empty, and person 2 comes in elsewhere with the ID.
     let left: (Places<'_>, Places<'_>) = (&[(1, 0.0)], &[(7, 0.0)]);
     let empty: (Places<'_>, Places<'_>) = (&[], &[]);
     let came: (Places<'_>, Places<'_>) = (&[(2, 5.0)], &[(7, 5.0)]);
@@ -213,7 +213,7 @@ fn a_newcomer_inherits_the_id_that_another_person_had_last() {
     // A person with the own ID of before, or a newcomer with a new one, has inherited nothing.
     assert_eq!(wrong_ids(&[left, empty, left]), (0, 0));
     assert_eq!(wrong_ids(&[left, empty, (&[(2, 5.0)], &[(8, 5.0)])]), (0, 0));
-    // An ID that was on nobody belongs to nobody.
+    // An ID that was on no person belongs to none.
     assert_eq!(wrong_ids(&[(&[(1, 0.0)], &[(7, 5.0)]), came]), (0, 0));
 }
 
@@ -225,7 +225,7 @@ fn two_people_who_swap_their_ids_inherit_both() {
     assert_eq!(wrong_ids(&[before, after, after]), (2, 2));
     // Person 2 alone takes over the ID of person 1, not found any more.
     assert_eq!(wrong_ids(&[before, (people, &[(7, 5.0)])]), (1, 1));
-    // A new ID is a switch and was nobody's.
+    // A new ID is a switch and was no person's.
     assert_eq!(wrong_ids(&[before, (people, &[(9, 0.0), (8, 5.0)])]), (1, 0));
 }
 

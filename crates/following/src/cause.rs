@@ -33,7 +33,7 @@ pub enum Cause {
 pub struct PlaceCause {
     /// The person there, if it is a tracked one.
     pub track: Option<TrackId>,
-    /// True if that is the person who is followed.
+    /// True if that is the followed person.
     pub is_target: bool,
     /// The place in the robot frame, m.
     pub at: Point2<f64>,
@@ -82,7 +82,7 @@ impl Cause {
         Some(cause.for_target(target))
     }
 
-    /// Notes whether the person at the place is the one who is followed.
+    /// Notes whether the person at the place is the followed one.
     fn for_target(self, target: Option<TrackId>) -> Self {
         match self {
             Self::Place(place) => {

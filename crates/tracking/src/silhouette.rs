@@ -1,5 +1,5 @@
 //! Boxes at the trunk that the depth image shows. The box of a track stands over its chest, which is
-//! assumed below the head; who leans, turns or carries something has it elsewhere.
+//! assumed below the head; a person that leans, turns or carries something has it elsewhere.
 
 use tagalong_core::{DepthImage, Frame, Track};
 use tagalong_geometry::Rect;
@@ -27,7 +27,7 @@ const LEAST_SHARE: f64 = 0.5;
 /// Largest standard deviation of the middle over the rows, in widths of the box.
 const MOST_SPREAD: f64 = 0.12;
 /// Largest distance of the trunk's middle from that of the box, in widths of the box: beyond it
-/// stands somebody else.
+/// stands another person.
 const FARTHEST: f64 = 0.25;
 /// Smallest box, pixels.
 const SMALLEST_PX: f64 = 24.0;

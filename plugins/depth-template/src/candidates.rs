@@ -13,7 +13,7 @@ pub mod tests_named {
     pub const WIDTH: &str = "head width";
     /// Nothing like a body below.
     pub const BODY: &str = "body below";
-    /// The silhouette fits so badly at a cell that nobody looks closer.
+    /// The silhouette fits too badly at a cell for a closer look.
     pub const REFINE: &str = "not refined";
     /// The silhouette does not fit where it fits best.
     pub const COST: &str = "template cost";

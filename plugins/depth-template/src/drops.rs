@@ -112,7 +112,7 @@ impl Drops {
         entry.places.push(Place { measured, ..Place::new(x, y, depth_m) });
     }
 
-    /// Forgets the places of a test that are near one that passed: somebody was found there.
+    /// Forgets the places of a test that are near one that passed: a person was found there.
     pub fn keep_apart(&mut self, test: &str, view: &MetricImage, passed: &[Cell]) {
         let Some(entry) = self.entries.iter_mut().find(|entry| entry.test == test) else { return };
         entry.places.retain(|place| {

@@ -30,7 +30,7 @@ pub(super) fn remedy(permission: Permission, enables: usize, options: &Options) 
     needed + &unheard.unwrap_or_default()
 }
 
-/// Says that nobody can enable the robot: no publisher of the enable is discovered.
+/// Says that the robot cannot be enabled: no publisher of the enable is discovered.
 pub(super) fn nobody(permission: Permission, enables: usize, enable: &str) -> Option<String> {
     (enables == 0 && !permission.is_granted()).then(|| format!("nobody publishes {enable}"))
 }

@@ -74,7 +74,7 @@ mod tests {
 
     use super::*;
 
-    /// Returns a person who walks 40 pixels a frame, and tracks that are so many frames late; `corners`
+    /// Returns a person with 40 pixels a frame, and tracks that are so many frames late; `corners`
     /// gives their boxes by two corners.
     fn walk(late: i64, corners: bool) -> Sequence {
         let mut frames = Vec::new();

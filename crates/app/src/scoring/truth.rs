@@ -397,7 +397,7 @@ impl TruthPosition {
     }
 }
 
-/// Returns a note on boxes of a truth that a pipeline proposed and nobody reviewed.
+/// Returns a note on boxes of a truth that a pipeline proposed, before their review.
 fn proposed_note(name: &str, rows: &[people::Row]) -> Option<String> {
     let proposed = rows.iter().filter(|row| !row.proposed.is_empty());
     let proposers: BTreeSet<&str> = proposed.clone().map(|row| row.proposed.as_str()).collect();

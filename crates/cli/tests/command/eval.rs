@@ -490,7 +490,7 @@ fn frames_from_0_and_a_log_beside_the_truth_are_found() {
     let mut tracks = String::new();
     for frame in 1..=20 {
         truth += &format!("{frame},1,{},20,26,26\n", 6 * frame);
-        // Nobody is in the frame that is called 0.
+        // The frame that is called 0 is empty.
         if frame > 1 {
             tracks += &format!("{},7,{},20,26,26,1\n", frame - 1, 6 * frame);
         }

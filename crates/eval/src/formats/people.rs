@@ -39,7 +39,7 @@ pub struct Row {
     pub interpolated: u8,
     /// True if the box was set by hand, false if it lies between boxes that were; true by default.
     pub key: bool,
-    /// Pipeline that proposed the box, if nobody reviewed it; empty by default.
+    /// Pipeline that proposed the box, if it is not reviewed; empty by default.
     pub proposed: String,
 }
 

@@ -80,7 +80,7 @@ pub(super) fn declared_inputs(
     Ok(settings.without.iter().fold(sum, |sum, input| sum.without(*input)))
 }
 
-/// Returns true if a network describes the people, by whom they are compared.
+/// Returns true if a network describes the people, by which they are compared.
 pub(super) fn describes(settings: &PipelineSettings, has_controller: bool) -> bool {
     let remembers = settings.reidentification.remember_s > 0.0;
     let compares = remembers || has_controller && settings.target.remember;

@@ -59,7 +59,7 @@ impl Controller for ForeseeFollow {
     }
 
     fn leaves_view(&self) -> bool {
-        // Behind a person who walks away the angle is 180 degrees.
+        // Behind a person that walks away the angle is 180 degrees.
         let angle = self.config.angle_rad();
         angle.is_some_and(|angle| std::f64::consts::PI - angle.abs() > VIEW_RAD)
     }

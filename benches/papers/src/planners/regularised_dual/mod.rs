@@ -331,7 +331,7 @@ mod tests {
     }
 
     /// The poses, in the axes of the first, of a robot that drives as planned for some steps to a goal
-    /// and around people who stand.
+    /// and around people at rest.
     fn drive(goal: Point2<f64>, people: &[[f64; 2]], steps: usize) -> Vec<Pose> {
         let body = Body::new(0.7, 0.55);
         let mut memory = Memory::default();
