@@ -1,7 +1,7 @@
 //! Tracks of other programs, scored beside the pipelines: `--tracks NAME=DIR`.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use tagalong_app::outcome::Failure;
 use tagalong_app::scoring::{
