@@ -265,7 +265,7 @@ class Pipeline:
         infinite without a pose]. detections: those of a detector of your own, for a config with the
         plugin `recorded-detections` ("recorded"): rows of x, y, width, height, score, pixels of the
         camera's image, or of x, y, z, score, the centre of the head in the robot frame, m; [] where
-        it found nobody, None where it did not run.
+        it found no person, None where it did not run.
         """
     def step_frame(self, frame: Frame) -> Report:
         """Takes a frame of `frames` through the pipeline, as the program does."""
