@@ -87,7 +87,9 @@ pub fn score_all(
         if signals.received().is_some() {
             return Ok(());
         }
-        let read = Shots::read(log, &InputSettings::default(), &Limits::default());
+        // All trackers share the log and its truth, so these are hashed once.
+        let read = check_inputs(tasks[0], &[("log", log), ("truth", &tasks[0].truth)])
+            .and_then(|()| Shots::read(log, &InputSettings::default(), &Limits::default()));
         for task in &tasks {
             let scored = match &read {
                 Ok(shots) => scored(task, shots),
@@ -103,7 +105,7 @@ pub fn score_all(
 
 /// Scores the tracks of one task.
 fn scored(task: &Task, shots: &Shots) -> Result<Stored, String> {
-    check_inputs(task).map_err(|failure| failure.message)?;
+    check_inputs(task, &[(TRACKS, &task.config)]).map_err(|failure| failure.message)?;
     let truth = truth_of(task).map_err(|failure| failure.message)?;
     let tracks = Tracks::read(&task.config, None).map_err(|failure| failure.message)?;
     let mut notes = notes_on(task, &truth, shots);
@@ -129,9 +131,9 @@ fn scored(task: &Task, shots: &Shots) -> Result<Stored, String> {
 }
 
 /// Refuses files that changed since they were planned: the hash of the task covers them.
-fn check_inputs(task: &Task) -> Result<(), Failure> {
-    for (name, path) in [("log", &task.log), ("truth", &task.truth), (TRACKS, &task.config)] {
-        if task.inputs.get(name) != Some(&sha256_of_file(path)?) {
+fn check_inputs(task: &Task, files: &[(&str, &Path)]) -> Result<(), Failure> {
+    for (name, path) in files {
+        if task.inputs.get(*name) != Some(&sha256_of_file(path)?) {
             let shown = path.display();
             return Err(Failure::usage(format!(
                 "{shown} changed since it was planned; plan again"

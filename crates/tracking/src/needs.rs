@@ -33,9 +33,9 @@ impl Needs {
             }
             added = added.union(preprocessor.plugin().adds());
         }
-        for at in search.due(frame, count) {
-            let plugin = &search.detectors[at].plugin;
-            require(plugin.name(), plugin.plugin().capabilities().inputs, frame, added)?;
+        for slot in search.detectors.iter().filter(|slot| slot.is_due(frame, count)) {
+            let inputs = slot.plugin.plugin().capabilities().inputs;
+            require(slot.plugin.name(), inputs, frame, added)?;
         }
         for verifier in &search.verifiers {
             require(verifier.name(), verifier.plugin().inputs(), frame, added)?;

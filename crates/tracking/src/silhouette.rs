@@ -84,11 +84,8 @@ fn depth_in_middle(rows: &[&[f32]], region: &Rect) -> Option<f64> {
     let last = (centre + MIDDLE * region.width) as usize;
     let mut found = Vec::new();
     for row in rows {
-        for depth_m in &row[first..last.min(row.len())] {
-            if *depth_m > 0.0 && depth_m.is_finite() {
-                found.push(f64::from(*depth_m));
-            }
-        }
+        let readings = row[first..last.min(row.len())].iter().copied();
+        found.extend(readings.filter(|metres| DepthImage::is_reading(*metres)).map(f64::from));
     }
     if found.len() < LEAST_READINGS { None } else { median(found) }
 }

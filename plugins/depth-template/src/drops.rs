@@ -79,8 +79,9 @@ impl Against {
 }
 
 impl Place {
-    fn new(x: i64, y: i64, depth_m: f64) -> Self {
-        Self { x, y, depth_m, measured: None }
+    /// Returns true if a reduced pixel is at least so many pixels away, along a row or a column.
+    fn is_apart(&self, x: i64, y: i64, apart: f64) -> bool {
+        (self.x - x).abs().max((self.y - y).abs()) as f64 >= apart
     }
 }
 
@@ -100,16 +101,13 @@ impl Drops {
             entry.places.clear();
         } else {
             let apart = APART_M * view.px_per_m(depth_m);
-            let is_apart = entry.places.iter().all(|kept| {
-                let aside = (kept.x - x).abs().max((kept.y - y).abs());
-                aside as f64 >= apart
-            });
+            let is_apart = entry.places.iter().all(|kept| kept.is_apart(x, y, apart));
             if !is_apart || entry.places.len() == MOST_PLACES {
                 return;
             }
         }
         let measured = against.map(|against| against.measured());
-        entry.places.push(Place { measured, ..Place::new(x, y, depth_m) });
+        entry.places.push(Place { x, y, depth_m, measured });
     }
 
     /// Forgets the places of a test that are near one that passed: a person was found there.
@@ -117,10 +115,7 @@ impl Drops {
         let Some(entry) = self.entries.iter_mut().find(|entry| entry.test == test) else { return };
         entry.places.retain(|place| {
             let apart = 2.0 * APART_M * view.px_per_m(place.depth_m);
-            passed.iter().all(|cell| {
-                let aside = (cell.x - place.x).abs().max((cell.y - place.y).abs());
-                aside as f64 >= apart
-            })
+            passed.iter().all(|cell| place.is_apart(cell.x, cell.y, apart))
         });
     }
 

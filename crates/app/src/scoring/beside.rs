@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::suggest::LOG_ENDINGS;
+
 /// Form of a file of truth that is named after its log.
 struct Form {
     /// Ending of the file, in the place of that of the log.
@@ -52,14 +54,12 @@ pub fn log_of(truth: &str) -> Option<&str> {
     None
 }
 
-/// Endings of logs.
-const LOGS: [&str; 3] = ["mcap", "bag", "db3"];
-
 /// Returns the log beside a file of truth that is named after it.
 pub fn log_beside(truth: &Path) -> Option<PathBuf> {
     let name = truth.file_name()?.to_string_lossy().into_owned();
     let stem = log_of(&name)?;
-    let mut logs = LOGS.iter().map(|ending| truth.with_file_name(format!("{stem}.{ending}")));
+    let mut logs =
+        LOG_ENDINGS.iter().map(|ending| truth.with_file_name(format!("{stem}.{ending}")));
     logs.find(|log| log.is_file())
 }
 

@@ -105,7 +105,7 @@ mod tests {
 
     #[test]
     fn frames_from_0_and_boxes_by_corners_are_suggested() {
-        // What is seen in frame 2 is written as frame 1.
+        // Boxes of frame 2 are written as those of frame 1.
         for (late, corners, part) in [
             (-1, false, "one higher: are the frames of the tracks counted from 0?"),
             (1, false, "one lower: are those of the truth counted from 0?"),

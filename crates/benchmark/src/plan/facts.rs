@@ -19,13 +19,18 @@ pub fn of_rooms(path: &Path) -> Result<Vec<Annotated>, Failure> {
     let shown = path.display().to_string();
     let mut logs = Vec::new();
     for room in &rooms.rooms {
-        for log in &room.logs {
-            let annotated =
-                of_file(log).map_err(|error| Failure::usage(error.render(&shown, &text)))?;
-            logs.push(with_facts(annotated, room));
-        }
+        let annotated = of_room(room);
+        logs.extend(annotated.map_err(|error| Failure::usage(error.render(&shown, &text)))?);
     }
     Ok(logs)
+}
+
+/// Returns the logs of a room, with their truth and what the room says about them.
+///
+/// # Errors
+/// A log that cannot be read or has no truth, with its place in the file.
+pub fn of_room(room: &Room) -> Result<Vec<Annotated>, ConfigError> {
+    room.logs.iter().map(|log| Ok(with_facts(of_file(log)?, room))).collect()
 }
 
 /// Adds what the rooms say about logs, by their names; says which are in no room.
@@ -49,7 +54,7 @@ pub fn in_rooms(path: &Path, logs: Vec<Annotated>) -> Result<Vec<Annotated>, Fai
 }
 
 /// Returns a log with what its room says about it.
-pub fn with_facts(log: Annotated, room: &Room) -> Annotated {
+fn with_facts(log: Annotated, room: &Room) -> Annotated {
     let file = room.logs.iter().find(|file| file.name() == log.name);
     let unjudged = file.map_or_else(Vec::new, |file| room.unjudged(file).to_vec());
     let single_frames = room.single_frames;
@@ -57,10 +62,7 @@ pub fn with_facts(log: Annotated, room: &Room) -> Annotated {
 }
 
 /// Returns a log that a file of rooms names, with its truth.
-///
-/// # Errors
-/// A log that cannot be read or has no truth, with its place in the file.
-pub fn of_file(log: &RoomFile) -> Result<Annotated, ConfigError> {
+fn of_file(log: &RoomFile) -> Result<Annotated, ConfigError> {
     let annotated = check_log_path(&log.path).and_then(|()| with_truth(&log.path));
     annotated.map_err(|failure| ConfigError::new(failure.message).or_at(Some(log.place.clone())))
 }

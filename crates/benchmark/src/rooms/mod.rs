@@ -60,12 +60,8 @@ fn locations(args: &RoomsArgs) -> Result<Vec<Location>, Failure> {
         .map_err(|error| Failure::usage(error.render(&shown, &text)))?;
     let mut locations = Vec::new();
     for room in rooms.rooms {
-        let mut logs = Vec::new();
-        for log in &room.logs {
-            let annotated =
-                facts::of_file(log).map_err(|error| Failure::usage(error.render(&shown, &text)))?;
-            logs.push(facts::with_facts(annotated, &room));
-        }
+        let logs =
+            facts::of_room(&room).map_err(|error| Failure::usage(error.render(&shown, &text)))?;
         let models = room.models.into_iter().map(|(plugin, model)| {
             let path = std::path::absolute(&model.path).map_err(Failure::failed)?;
             if path.is_file() {
