@@ -29,6 +29,11 @@ pub const SYSTEM: System = System {
             run: table::told,
         },
         Experiment { name: "laser", about: "people by the laser scanner", run: table::laser },
+        Experiment {
+            name: "fine-laser",
+            about: "people by a laser scanner of 720 rays",
+            run: table::fine_laser,
+        },
         Experiment { name: "depth", about: "people by depth images", run: table::depth },
         Experiment {
             name: "walk-told",
@@ -37,7 +42,7 @@ pub const SYSTEM: System = System {
         },
         Experiment {
             name: "walk-laser",
-            about: "people by the laser scanner, behind the same target",
+            about: "people by a laser scanner of 720 rays, behind the same target",
             run: table::walk_laser,
         },
         Experiment {

@@ -18,6 +18,8 @@ pub(super) const PLANNERS: [(&str, &str); 5] = [
 ];
 /// Seeds of each setting.
 const SEEDS: u64 = 20;
+/// Rays of a common scanner over a full turn, half a degree apart.
+const FINE_RAYS: &str = "720";
 /// Config of people by a laser scanner, and its sections that find them.
 const BY_LASER: &str = "laser-legs";
 const FINDS: [&str; 5] = ["detectors", "filter", "associator", "manager", "merge"];
@@ -27,18 +29,21 @@ const FINDS: [&str; 5] = ["detectors", "filter", "associator", "manager", "merge
 pub(super) enum Source {
     /// It is told the places of all people in sight, and which of them is the target.
     Told,
-    /// It finds legs in the scans of its laser scanner.
+    /// It finds legs in the scans of the benchmark's laser scanner, 200 rays over a full turn.
     Laser,
+    /// It finds legs in the scans of a scanner of [`FINE_RAYS`].
+    FineLaser,
     /// It finds heads and shoulders in its depth images.
     Depth,
 }
 
 impl Source {
-    /// Returns the values of a scene with the images that are needed: colours tell people apart by their
+    /// Returns the values of a scene with the sensors that are needed: colours tell people apart by their
     /// clothes, and take more than half of the time of a ride.
-    fn images(self) -> &'static [(&'static str, &'static str)] {
+    fn sensors(self) -> &'static [(&'static str, &'static str)] {
         match self {
             Self::Told | Self::Laser => &[("camera.colour", "false")],
+            Self::FineLaser => &[("camera.colour", "false"), ("laser.rays", FINE_RAYS)],
             Self::Depth => &[],
         }
     }
@@ -99,7 +104,7 @@ impl Job {
         let mut end = UntilArrival::or_at(ends_s);
         let ride = match self.source {
             Source::Told => Ride::told,
-            Source::Laser | Source::Depth => Ride::new,
+            Source::Laser | Source::FineLaser | Source::Depth => Ride::new,
         };
         ride(&self.scene, &self.contender, lab.registry, &mut end)
     }
@@ -115,7 +120,7 @@ pub(super) fn jobs(
 ) -> Result<Vec<Job>, ReproduceError> {
     let mut jobs = Vec::new();
     for setting in SETTINGS {
-        let scenes = lab.scenes(&format!("among-{setting}"), source.images(), lab.seeds(SEEDS))?;
+        let scenes = lab.scenes(&format!("among-{setting}"), source.sensors(), lab.seeds(SEEDS))?;
         for (planner, config) in planners {
             let contender = contender(lab, config, source)?;
             for scene in &scenes {
@@ -135,7 +140,7 @@ fn contender(lab: &Lab, config: &str, source: Source) -> Result<Contender, Repro
     let contender = lab.contender(config)?;
     match source {
         Source::Told => Ok(contender.told(lab.registry)?),
-        Source::Laser => by_laser(&contender, &lab.contender(BY_LASER)?),
+        Source::Laser | Source::FineLaser => by_laser(&contender, &lab.contender(BY_LASER)?),
         Source::Depth => Ok(contender),
     }
 }
@@ -184,7 +189,7 @@ mod tests {
         let lab = lab(&registry, true, None);
         for (_, config) in PLANNERS {
             let mut controllers = Vec::new();
-            for source in [Source::Told, Source::Laser, Source::Depth] {
+            for source in [Source::Told, Source::Laser, Source::FineLaser, Source::Depth] {
                 let contender = contender(&lab, config, source).unwrap();
                 let pipeline = contender.pipeline(&registry, 0).unwrap();
                 assert!(pipeline.has_controller(), "{config}");
@@ -195,12 +200,23 @@ mod tests {
                 let names: Vec<_> = detectors.iter().filter_map(|d| d["plugin"].as_str()).collect();
                 let expected = match source {
                     Source::Told => "recorded-detections",
-                    Source::Laser => "laser-legs",
+                    Source::Laser | Source::FineLaser => "laser-legs",
                     Source::Depth => "depth-template",
                 };
                 assert_eq!(names, [expected], "{config}");
             }
             assert!(controllers.iter().all(|one| *one == controllers[0]), "{config}");
+        }
+    }
+
+    #[test]
+    fn the_scanners_differ_in_their_rays() {
+        let registry = tagalong_config::Registry::default();
+        let lab = lab(&registry, true, None);
+        for (source, rays) in [(Source::Laser, 200), (Source::FineLaser, 720)] {
+            for job in jobs(&lab, &PLANNERS[..1], source, None).unwrap() {
+                assert_eq!(job.scene.laser.as_ref().map(|laser| laser.rays), Some(rays));
+            }
         }
     }
 

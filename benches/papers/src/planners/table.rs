@@ -31,6 +31,11 @@ pub(super) fn laser(lab: &Lab) -> Result<Findings, ReproduceError> {
     table(lab, Source::Laser, None)
 }
 
+/// Returns the rides by a scanner of more rays.
+pub(super) fn fine_laser(lab: &Lab) -> Result<Findings, ReproduceError> {
+    table(lab, Source::FineLaser, None)
+}
+
 /// Returns the rides by depth images.
 pub(super) fn depth(lab: &Lab) -> Result<Findings, ReproduceError> {
     table(lab, Source::Depth, None)
@@ -41,9 +46,9 @@ pub(super) fn walk_told(lab: &Lab) -> Result<Findings, ReproduceError> {
     table(lab, Source::Told, Some(WALK_MPS))
 }
 
-/// Returns the rides as [`laser`], behind a slower target.
+/// Returns the rides as [`fine_laser`], behind a slower target.
 pub(super) fn walk_laser(lab: &Lab) -> Result<Findings, ReproduceError> {
-    table(lab, Source::Laser, Some(WALK_MPS))
+    table(lab, Source::FineLaser, Some(WALK_MPS))
 }
 
 /// Returns the rides as [`depth`], behind a slower target.
@@ -81,6 +86,7 @@ fn title(source: Source) -> &'static str {
     match source {
         Source::Told => "Follow-Bench, told where people are",
         Source::Laser => "Follow-Bench, people by the laser scanner",
+        Source::FineLaser => "Follow-Bench, people by a laser scanner of 720 rays",
         Source::Depth => "Follow-Bench, people by depth images",
     }
 }
@@ -90,6 +96,7 @@ fn prefix(source: Source, target_mps: Option<f64>) -> String {
     let source = match source {
         Source::Told => "told",
         Source::Laser => "laser",
+        Source::FineLaser => "fine laser",
         Source::Depth => "depth",
     };
     target_mps.map_or(source.to_owned(), |mps| format!("{source} {mps} m/s"))
@@ -168,10 +175,10 @@ mod tests {
 
     #[test]
     fn rows_of_all_tables_have_names_of_their_own() {
-        let all = [Source::Told, Source::Laser, Source::Depth]
+        let all = [Source::Told, Source::Laser, Source::FineLaser, Source::Depth]
             .map(|source| [prefix(source, None), prefix(source, Some(WALK_MPS))]);
         assert_eq!(all[0], ["told", "told 0.8 m/s"]);
         let names: std::collections::BTreeSet<_> = all.as_flattened().iter().collect();
-        assert_eq!(names.len(), 6);
+        assert_eq!(names.len(), 8);
     }
 }
