@@ -10,7 +10,7 @@ use tagalong_app::missed::{Depths, Rules, Witness};
 use tagalong_app::outcome::{Failure, say};
 use tagalong_app::progress::Forecast;
 use tagalong_app::remedies::Remedies;
-use tagalong_app::scoring::{RULES_HINT, Shot, Shots, TruthFile, TruthOptions, truth_notes};
+use tagalong_app::scoring::{Shot, Shots, TruthFile, TruthOptions, truth_notes};
 use tagalong_app::signals::Signals;
 use tagalong_app::unable::unable;
 use tagalong_config::Registry;
@@ -316,12 +316,7 @@ pub fn truth_of(task: &Task) -> Result<TruthFile, Failure> {
         drops_doubled_ids: task.drops_doubled_ids,
         ..TruthOptions::default()
     };
-    let truth = TruthFile::read(&task.truth, options).map_err(|failure| {
-        // Here is no option for it.
-        let message = failure.message.replace(RULES_HINT, " (by `--rules` of `eval`, not here)");
-        Failure { message, ..failure }
-    })?;
-    Ok(truth.without_judging(&task.unjudged))
+    Ok(TruthFile::read(&task.truth, options)?.without_judging(&task.unjudged))
 }
 
 /// Returns the notes on the truth of a log, without its folder: results are the same everywhere.

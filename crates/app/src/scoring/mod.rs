@@ -23,7 +23,7 @@ use tagalong_config::{FileLimit, read_text as read_bounded};
 use tagalong_eval::formats::{OddLines, kitti};
 use tagalong_eval::{Comparison, EvalError, Frame, Region, Report, Sequence, Similarity, Truth};
 pub use tracks::Tracks;
-pub use truth::{RULES_HINT, RulesChoice, TruthFile, TruthOptions};
+pub use truth::{RulesChoice, TruthFile, TruthOptions};
 
 /// Reports by the number of their frame, from 1.
 pub type Reports = BTreeMap<u32, Vec<Report>>;

@@ -17,9 +17,6 @@ use super::{Shots, odd_labels, read_text, region, without_area};
 /// Largest difference between the stamps of an image and its truth in a log, ns.
 const SAME_MOMENT_NS: u64 = 5_000_000;
 
-/// Option of `eval` for truth that follows rules of its own, at the end of an error.
-pub const RULES_HINT: &str = " (--rules mot15, mot17 or mot20)";
-
 /// Number of frames, and part of all frames, after the last person of a truth beyond which it may be
 /// unfinished.
 const EARLY_FRAMES: u32 = 10;
@@ -50,6 +47,8 @@ pub enum RulesChoice {
 pub struct TruthOptions {
     /// Rules of MOTChallenge text.
     pub rules: RulesChoice,
+    /// True if the caller has an option `--rules`: an error about rules names it.
+    pub takes_rules: bool,
     /// True if boxes are of whole people: their upper bodies are compared.
     pub upper_body: bool,
     /// True if the first of several people with one ID in a frame is kept, and the others are left out
@@ -132,7 +131,7 @@ impl TruthFile {
             Kind::People => Self::of_people(path)?,
             Kind::Floor => Self::of_floor(path)?,
             Kind::Kitti => Self::of_kitti(path)?,
-            Kind::Mot => Self::of_mot(path, options.rules)?,
+            Kind::Mot => Self::of_mot(path, options)?,
         };
         truth.whole_bodies = options.upper_body;
         if options.drops_doubled_ids {
@@ -182,15 +181,21 @@ impl TruthFile {
         self.frames.entry(key).or_default().people.push((truth, place));
     }
 
-    fn of_mot(path: &Path, rules: RulesChoice) -> Result<Self, Failure> {
+    fn of_mot(path: &Path, options: TruthOptions) -> Result<Self, Failure> {
         let text = read_text(path)?;
         let name = path.display().to_string();
-        let rules = match rules {
+        let rules = match options.rules {
             RulesChoice::Auto => mot::Rules::of_truth(&text, &name).map_err(|error| {
                 // Rows that no rules can read are refused by the same function.
                 let is_of_rules = error.why.contains("rules");
-                let hint = if is_of_rules { RULES_HINT } else { "" };
-                Failure::failed(format!("{error}{hint}"))
+                let remedy = if !is_of_rules {
+                    ""
+                } else if options.takes_rules {
+                    " (--rules mot15, mot17 or mot20)"
+                } else {
+                    " (by `--rules` of `eval`, not here)"
+                };
+                Failure::failed(format!("{error}{remedy}"))
             })?,
             RulesChoice::Mot15 => mot::Rules::Mot15,
             RulesChoice::Mot17 => mot::Rules::Mot17,
@@ -554,6 +559,22 @@ mod tests {
         let guessed = file.compared(whole(1.7), None);
         let on_floor = file.compared(whole(1.7), Some(&camera()));
         assert!((guessed.width / on_floor.width - 1.0).abs() < 0.06, "{guessed:?} {on_floor:?}");
+    }
+
+    #[test]
+    fn an_error_about_rules_names_the_option_of_a_caller_that_has_it() {
+        let name = format!("tagalong-mixed-rules-{}.txt", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        std::fs::write(&path, "1,1,10,10,5,5,1,1,1\n1,2,30,10,5,5,1,-1,-1,-1\n").unwrap();
+        for (takes_rules, remedy) in [
+            (true, "(--rules mot15, mot17 or mot20)"),
+            (false, "(by `--rules` of `eval`, not here)"),
+        ] {
+            let options = TruthOptions { takes_rules, ..TruthOptions::default() };
+            let failure = TruthFile::read(&path, options).unwrap_err();
+            assert!(failure.message.ends_with(remedy), "{}", failure.message);
+        }
+        std::fs::remove_file(path).unwrap();
     }
 
     #[test]

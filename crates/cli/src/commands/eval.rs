@@ -216,8 +216,12 @@ struct Judged {
 
 /// Reads truth and tracks; with `upper_body` the truth's boxes are whole bodies, and cut.
 fn judged(args: &EvalArgs, upper_body: bool) -> Result<Judged, Failure> {
-    let options =
-        TruthOptions { rules: args.rules, upper_body, drops_doubled_ids: args.drop_doubled_ids };
+    let options = TruthOptions {
+        rules: args.rules,
+        takes_rules: true,
+        upper_body,
+        drops_doubled_ids: args.drop_doubled_ids,
+    };
     let mut truth = TruthFile::read(&args.truth, options)?;
     let tracks = Tracks::read(&args.tracks, truth.info.as_ref().map(|info| info.length))?;
     let shots = shots(args, &truth, &tracks)?;
