@@ -11,10 +11,10 @@ use crate::{BridgeError, ClockSource, ForecastFrame, Middleware};
 
 /// Follows people live: ROS 2 images and odometry in, tracks and commands out.
 ///
-/// Needs no ROS on this machine. The config is one that `tagalong run` takes;
-/// topics that neither it nor the command line names are found by their types.
-/// Ends with Ctrl-C; the last command is zero. This is no safety function: the
-/// robot needs its own bumper, scanner or emergency stop.
+/// Needs no ROS on this machine. Uses the configs of `tagalong run`; topics that
+/// neither the config nor the command line names are found by type. Ctrl-C ends
+/// it, with zero as the last command. This is no safety function: the robot needs
+/// its own bumper, scanner or emergency stop.
 #[derive(Clone, Debug, clap::Parser)]
 #[command(
     name = "tagalong-ros2",
@@ -23,9 +23,9 @@ use crate::{BridgeError, ClockSource, ForecastFrame, Middleware};
   tagalong-ros2 depth-ekf
         tracks people, moves nothing (the config has no controller)
   tagalong-ros2 my-robot.toml --namespace /robot1 --domain 7
-        follows somebody; commands go to /robot1/cmd_vel
+        follows a person; commands go to /robot1/cmd_vel
   tagalong-ros2 my-robot.toml --command cmd_vel_nav
-        lets another node (a collision monitor, say) pass commands on
+        sends commands to another node, such as a collision monitor, which passes them on
 
 Exit codes: 0 ok, 1 failed or a topic is missing, 2 wrong usage or config,
 130 and 143 after SIGINT and SIGTERM."
@@ -40,13 +40,13 @@ pub struct Options {
     /// Namespace of the node; relative topic names are inside it.
     #[arg(long, default_value = "/")]
     pub namespace: String,
-    /// Topic of the colour images; over `[input] colour_topic`.
+    /// Topic of the colour images, instead of `[input] colour_topic`.
     #[arg(long, value_name = "TOPIC")]
     pub colour: Option<String>,
-    /// Topic of the depth images; over `[input] depth_topic`.
+    /// Topic of the depth images, instead of `[input] depth_topic`.
     #[arg(long, value_name = "TOPIC")]
     pub depth: Option<String>,
-    /// Topic of the odometry; over `[input] odometry_topic`.
+    /// Topic of the odometry, instead of `[input] odometry_topic`.
     #[arg(long, value_name = "TOPIC")]
     pub odometry: Option<String>,
     /// Topic of confirmed tracks (vision_msgs/Detection3DArray).
@@ -65,13 +65,13 @@ pub struct Options {
     /// Topic that clears a stop and a fault (std_msgs/Empty); needed after each start.
     #[arg(long, value_name = "TOPIC", default_value = "people/reset")]
     pub reset: String,
-    /// Topic of a header for each turn of the bridge's loop (std_msgs/Header).
+    /// Topic of the heartbeat, a header for each turn of the bridge's loop (std_msgs/Header).
     #[arg(long, value_name = "TOPIC", default_value = "people/heartbeat")]
     pub heartbeat: String,
     /// Topic of the bridge's state (diagnostic_msgs/DiagnosticArray).
     #[arg(long, value_name = "TOPIC", default_value = "/diagnostics")]
     pub diagnostics: String,
-    /// Topic of shapes that RViz draws (visualization_msgs/MarkerArray); empty for none.
+    /// Topic of markers for RViz (visualization_msgs/MarkerArray); empty for none.
     #[arg(long, value_name = "TOPIC", default_value = "people/markers")]
     pub markers: String,
     /// Topic of a transform for each person, `person_ID` (tf2_msgs/TFMessage); empty for none.
@@ -119,8 +119,8 @@ pub struct Options {
     /// Longest wait for topics and their first messages, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 15.0, value_parser = seconds)]
     pub wait: f64,
-    /// Serve a page with what happens now, as `tagalong run --serve` does: on this computer alone and
-    /// a free port, unless a port or an address is given. Nothing can be changed through it.
+    /// Serve a live page, as `tagalong run --serve` does: only on this computer and on a free port,
+    /// unless a port or an address is given. The page cannot change anything.
     #[arg(
         long,
         value_name = "[ADDRESS:]PORT",
@@ -133,8 +133,8 @@ pub struct Options {
     /// Clock for the age of a frame.
     #[arg(long, value_enum, default_value_t)]
     pub clock: ClockSource,
-    /// Action of Nav2's following server (nav2_msgs/FollowObject), which drives in place of this
-    /// program; it is given a goal while the switch allows it and a person is followed.
+    /// Action of Nav2's following server (nav2_msgs/FollowObject), which drives instead of this
+    /// program; it has a goal while the switch allows it and a person is followed.
     #[arg(
         long,
         value_name = "ACTION",
@@ -143,7 +143,7 @@ pub struct Options {
         default_missing_value = "follow_object"
     )]
     pub follow_object: Option<String>,
-    /// Check the config, print the distances that follow from it, and end: nothing is published.
+    /// Check the config, print the distances that follow from it, and exit: nothing is published.
     #[arg(long)]
     pub check: bool,
     /// Start unconfigured, and wait for a manager to configure and activate the node (lifecycle_msgs).

@@ -67,27 +67,28 @@ pub struct AnnotateArgs {
     /// The log.
     pub log: PathBuf,
     /// Pipeline that proposes tracks: a config, or the name of a built-in one [default: the one for
-    /// what the log has].
+    /// the sensors in the log].
     pub config: Option<PathBuf>,
-    /// The file to write, or to go on with [default: LOG.people.csv].
+    /// The file to write or to continue [default: LOG.people.csv].
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// Port of the page on this computer; 0 takes a free one.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub port: u16,
-    /// Begin without proposed tracks.
+    /// Start without proposed tracks.
     #[arg(long)]
     pub empty: bool,
 }
 
 /// Examples for `tagalong annotate --help`.
 pub const HELP: &str = "\
-Opens a page for your browser on this computer; nothing leaves it. A pipeline proposes tracks, unless the
-file exists: then that is continued; to compare pipelines begin with --empty, or review every frame
-(R): truth that a pipeline proposed favours it. Click a head or drag a box; a digit is the ID of the person;
-between two boxes that were set the others are interpolated; depth fills in the places. The file is
-written whole after every change, so a kill loses nothing. `Finish` in the page ends with exit code 0,
-Ctrl-C with 130; the file is whole in both cases. `eval`, `bench` and `view` find it beside the log.
+Opens a page for your browser on this computer; no data leaves it. A pipeline proposes tracks; if the
+file exists, its annotation is continued instead. To compare pipelines start with --empty, or review
+every frame (R), because truth that a pipeline proposed favours it. Click a head or drag a box; a digit
+sets the ID of the person; boxes between two that you set are interpolated; depth gives the positions.
+The whole file is written after every change, so a kill loses nothing. `Finish` in the page ends with
+exit code 0, Ctrl-C with 130; the file is valid in both cases. `eval`, `bench` and `view` find it
+beside the log.
 
 Examples:
   tagalong annotate robot.mcap

@@ -8,12 +8,12 @@ use crate::config_file::OuterSettings;
 /// Arguments of the commands that read a log; they replace what the config says.
 #[derive(Args, Clone, Debug, Default)]
 pub struct InputArgs {
-    /// Camera whose images are used, of several: the folder that its topics share, as
+    /// Camera whose images are used, if there are several: the common folder of its topics, such as
     /// /front_camera.
     #[arg(long, value_name = "NAME")]
     pub camera: Option<String>,
-    /// Times of the messages: their stamps, or the times at which they were recorded, for stamps
-    /// that are not set or of another clock.
+    /// Times of the messages: their stamps, or the times at which they were recorded, if stamps are not
+    /// set or come from another clock.
     #[arg(long, value_enum)]
     pub stamps: Option<StampArg>,
 }

@@ -11,7 +11,7 @@ pub use super::rooms::RoomsArgs;
 #[derive(Args, Debug)]
 #[command(args_conflicts_with_subcommands = true)]
 pub struct BenchArgs {
-    /// One step; all three without one.
+    /// One step; without one, all three.
     #[command(subcommand)]
     pub(crate) step: Option<Step>,
     #[command(flatten)]
@@ -75,7 +75,7 @@ pub struct PlanArgs {
     #[arg(long, num_args = 1.., value_name = "CONFIG")]
     pub configs: Vec<PathBuf>,
     /// The logs; the truth of NAME.mcap is NAME.people.csv, NAME.truth.jsonl, NAME.boxes.csv,
-    /// NAME.people-floor.csv, or in it.
+    /// NAME.people-floor.csv, or in the log.
     #[arg(long, num_args = 1.., value_name = "LOG")]
     pub logs: Vec<PathBuf>,
     /// Every log with truth in this folder.
@@ -86,14 +86,14 @@ pub struct PlanArgs {
     #[arg(long, num_args = 1.., value_name = "NAME=DIR")]
     pub tracks: Vec<ForeignTracks>,
     /// The rooms of the logs, as for --leave-one-room-out: which logs are single frames or of one room,
-    /// and the frames that are not judged. Without --logs and --logs-dir all logs of the rooms.
+    /// and the frames that are not scored. Without --logs and --logs-dir, all logs of the rooms are used.
     #[arg(long, value_name = "ROOMS")]
     pub rooms: Option<PathBuf>,
     /// Runs each pipeline with this many seeds, counted from that of its config.
     #[arg(long, value_name = "N", default_value_t = 1,
           value_parser = clap::value_parser!(u64).range(1..=1000))]
     pub seeds: u64,
-    /// Of several people of a truth with one ID in a frame keep the first, and count the others.
+    /// Keep the first of several people with the same ID in a frame of a truth, and count the others.
     #[arg(long)]
     pub drop_doubled_ids: bool,
 }
@@ -165,7 +165,7 @@ pub struct GateArgs {
     /// An earlier report.json to compare with.
     #[arg(long, value_name = "FILE")]
     pub baseline: Option<PathBuf>,
-    /// Exit with 1 if a figure changed like this, for example HOTA<-0.01,
+    /// Exit with 1 if a figure changed by this much, for example HOTA<-0.01,
     /// IDSW>0 or metres.MOTA<-0.02.
     #[arg(long, value_name = "FIGURE<CHANGE", requires = "baseline", num_args = 1..)]
     pub fail_if: Vec<String>,

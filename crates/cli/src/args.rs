@@ -19,8 +19,8 @@ use crate::commands::{AlterArgs, BlurArgs, EvalArgs, ModelArgs};
 use crate::demo::DemoArgs;
 use crate::run::RunArgs;
 
-/// Finds people in the log of a mobile robot, keeps track of them, and follows
-/// one of them.
+/// Detects people in the logs of a mobile robot, tracks them, and follows one of
+/// them.
 #[derive(Debug, Parser)]
 #[command(name = "tagalong", version, about, after_help = EXIT_CODES, max_term_width = 100)]
 pub struct Cli {
@@ -41,16 +41,16 @@ files are valid).";
 /// The subcommands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Shows everything on a simulated scene: a log, two pipelines, pictures, a report
+    /// Demonstrates all steps on a simulated scene: a log, two pipelines, pictures, a report
     #[command(after_help = DEMO_HELP)]
     Demo(DemoArgs),
-    /// Tracks the people of a log
+    /// Tracks the people in a log
     #[command(after_help = RUN_HELP)]
     Run(RunArgs),
-    /// Makes a page of a run to look at: images, plan, events, and why a person was missed
+    /// Writes a page about a run: images, plan, events, and why people were missed
     #[command(after_help = VIEW_HELP)]
     View(ViewArgs),
-    /// Opens a page to annotate the people of a log: truth for `eval`, `bench` and `view`
+    /// Opens a page to annotate the people in a log: truth for `eval`, `bench` and `view`
     #[command(after_help = ANNOTATE_HELP)]
     Annotate(AnnotateArgs),
     /// Lists the plugins
@@ -66,7 +66,7 @@ pub enum Command {
         /// Name of the plugin, `pipeline` for everything around the plugins, `all`, or `funnel` for
         /// the settings of each test.
         plugin: String,
-        /// As TOML, as a table, or as a JSON schema.
+        /// Output format: TOML, a table, or a JSON schema.
         #[arg(long, value_enum, default_value_t)]
         format: TableFormat,
     },
@@ -102,7 +102,7 @@ pub enum Command {
     /// Explains missing or false detections in a log
     #[command(after_help = DOCTOR_HELP)]
     Doctor(DoctorArgs),
-    /// Makes a log from a data set or a folder of images
+    /// Converts a data set or a folder of images to a log
     #[command(after_help = IMPORT_HELP)]
     Import(ImportArgs),
     /// Compares pipelines on the same logs
@@ -111,10 +111,10 @@ pub enum Command {
     /// Scores tracks against the ground truth
     #[command(after_help = EVAL_HELP)]
     Eval(EvalArgs),
-    /// Simulates the log of a robot among people, with the ground truth, from a scene
+    /// Simulates a scene, and writes the log of a robot among people with the ground truth
     #[command(after_help = SIMULATE_HELP)]
     Simulate(SimulateArgs),
-    /// Lets a pipeline steer the simulated robot after a person, and scores the ride
+    /// Lets a pipeline drive a simulated robot that follows a person, and scores the rides
     #[command(after_help = FOLLOW_HELP)]
     Follow(FollowArgs),
     /// Compares pipelines on many random variants of the same scenes, in memory
@@ -123,16 +123,16 @@ pub enum Command {
     /// Tracks the boxes of another detector, without images, and compares associations
     #[command(after_help = BOXES_HELP)]
     Boxes(BoxesArgs),
-    /// Makes the model file of a plugin, and its card
+    /// Trains the model of a plugin, and writes it with its card
     #[command(after_help = TRAIN_HELP)]
     Train(TrainArgs),
-    /// Says what a neural network in an ONNX file is, and how to use it
+    /// Inspects a neural network in an ONNX file, installs it, or prints a config for it
     #[command(after_help = MODEL_HELP)]
     Model(ModelArgs),
     /// Copies a log with one thing changed: half the rate, mirrored, scaled depth, wrong pixels
     #[command(after_help = ALTER_HELP)]
     Alter(AlterArgs),
-    /// Copies a log with the heads of its people blurred, to share it
+    /// Copies a log with the heads of people blurred, to share it
     #[command(after_help = BLUR_HELP)]
     Blur(BlurArgs),
     /// Lists the contents of a log, and the inputs that a pipeline could use
@@ -140,7 +140,7 @@ pub enum Command {
     Inspect {
         /// The log: MCAP, `.db3`, `.bag`, or the folder of a bag.
         log: PathBuf,
-        /// Take the `[input]` and `[limits]` sections of this config.
+        /// Use the `[input]` and `[limits]` sections of this config.
         #[arg(long)]
         config: Option<PathBuf>,
         /// Way in which the log is read.
@@ -153,12 +153,12 @@ pub enum Command {
 }
 
 const BLUR_HELP: &str = "\
-People are found by a run, and their heads are blurred in the images that it used, also half a second
-before and after. All else is copied message by message, depth included; images and coloured points in
-which nobody was looked for are left out, and listed. A head that the run did not find is not
-blurred: look through the copy before you share it. The copy is an MCAP file without the attachments
-of the log; pictures and pages of a run over it show the blurred images. Exit code 3: images could not
-be decoded, and are left out.
+A run finds people, and their heads are blurred in the images that it used, from half a second before
+to half a second after. Everything else is copied message by message, depth included; images and
+coloured points that were not searched for people are left out, and listed. A head that the run did
+not find is not blurred: check the copy before you share it. The copy is an MCAP file without the
+attachments of the log; pictures and pages of a run over it show the blurred images. Exit code 3: some
+images could not be decoded, and are left out.
 
 Examples:
   tagalong blur robot.mcap
@@ -168,9 +168,9 @@ Examples:
 
 const ALTER_HELP: &str = "\
 The copy has the frames that a pipeline would see: colour or grey images, depth registered to them, the
-pose of the camera, and the odometry of the log. Right images, laser scans and all else are left out.
-LOG.people.csv, if it is there, is changed alike. A pipeline whose figures on the copy are much worse
-than those on the log depends on what was changed.
+pose of the camera, and the odometry of the log. Right images, laser scans and everything else are
+left out. LOG.people.csv, if it exists, is changed in the same way. A pipeline whose figures are much
+worse on the copy than on the log depends on the property that was changed.
 
 Examples:
   tagalong alter robot.mcap --every 2                        # half the images per second
@@ -179,21 +179,21 @@ Examples:
   tagalong bench --logs robot.mcap robot-altered.mcap -o out";
 
 const MODEL_HELP: &str = "\
-Prints inputs and outputs of the file, the family of detectors that its outputs have the shapes of,
-or that it is for re-identification, and the part of a config that runs it, which is TOML as it
-stands. Exit code 1: no config can use the file; the reason is printed. With `--export` it writes the
-network of a plugin as a file instead.
+Prints the inputs and outputs of the file, the family of detectors that its outputs match, or that it
+is for re-identification, and the part of a config that runs it; the output is valid TOML. Exit code 1:
+no config can use the file; the reason is printed. With `--export` it writes the network of a plugin
+into the file instead.
 
 Examples:
   tagalong model yolox_s.onnx
   tagalong model yolox_s.onnx > people.toml && tagalong run people.toml robot.mcap
   tagalong model yolov8n-dynamic.onnx --size 320 320
   tagalong model yolox_s.onnx --format json | jq -r .family
-  tagalong model osnet_x0_25.onnx        # the section [appearance] that it belongs into
+  tagalong model osnet_x0_25.onnx        # prints the section [appearance] for it
   tagalong model --export depth-net depth-net.onnx";
 
 const DEMO_HELP: &str = "\
-Needs no file, and half a minute.
+Needs no input file, and takes half a minute.
 
 Examples:
   tagalong demo
@@ -202,8 +202,8 @@ Examples:
 const DOCTOR_HELP: &str = "\
 Measures intrinsics, stamps, frames, light, depth, its registration to colour, floor and mount; then
 runs the pipeline for a while, compares its tracks with the person-sized shapes that come and go in
-depth, and shows what each of its tests dropped. Where tracks and depth do not agree it tries other
-settings on the log. Each finding says what to change in the config. Exit code 3: something is bad.
+depth, and shows what each of its tests dropped. If tracks and depth disagree, it tries other settings
+on the log. Each finding says what to change in the config. Exit code 3: a finding is bad.
 
 Examples:
   tagalong doctor robot.mcap
@@ -213,8 +213,8 @@ Examples:
   tagalong doctor configs/depth-ekf.toml robot.mcap --format json | jq '.findings[] | select(.severity == \"bad\")'";
 
 const IMPORT_HELP: &str = "\
-Images are taken as they are; truth, where the data set has it, goes beside the log, where `eval` and
-`bench` find it.
+Images are copied unchanged; truth, if the data set has it, is written beside the log, where `eval`
+and `bench` find it.
 
 Examples:
   tagalong import tum rgbd_dataset_freiburg3_walking_xyz
@@ -226,13 +226,13 @@ Examples:
   tagalong import images colour --depth depth --depth-unit 0.001 --focal 525";
 
 const FOLLOW_HELP: &str = "\
-Prints how long the right person was followed, and the wrong one, how soon somebody who came back was
-found, the distance, the room to people and things, and how smooth the ride was. The log of a ride has
-its images, the truth, the commands (/cmd_vel) and their reasons (/follow/frames); --overlay puts a
-picture per frame beside it.
+Prints how long the right person and a wrong one were followed, how soon a person who came back was
+found again, the distance, the clearance to people and objects, and how smooth the ride was. The log of
+a ride has its images, the truth, the commands (/cmd_vel) and their reasons (/follow/frames); --overlay
+adds a picture per frame.
 
---inject breaks the robot in the middle of a ride: a sensor freezes, goes dark, is late or repeats itself,
-the odometry is silent or wrong, the clock jumps, the wheels do not obey. Its kinds are
+--inject adds a fault in the middle of a ride: a sensor freezes, goes dark, is late or repeats its data,
+the odometry is silent or wrong, the clock jumps, the wheels do not obey. The kinds of faults are
   freeze-depth freeze-all freeze-laser blank-depth saturate-depth dark-columns noise-depth
   laser-invalid laser-near delay resend drop drop-laser freeze-sensors drop-sensors
   nan-odometry odometry-silent odometry-frozen odometry-wrong odometry-late-stamps
@@ -242,8 +242,8 @@ docs/reference/faults.md describes them.
 
 With --approaches a person or a trolley comes at the robot from any side, at 0.2 to 1.6 m/s, at any
 moment of a short ride, and does not avoid it. Prints in how many approaches the robot moved at a
-contact, with the exact bound of 95 % that the number of approaches allows. --replay tells the course
-of one of them by its seed.
+contact, with the exact 95 % bound for this number of approaches. --replay prints the course of the
+approach with a seed.
 
 Examples:
   tagalong follow
@@ -256,8 +256,8 @@ Examples:
   tagalong follow configs/follow-depth.toml --replay 2000000007 --faults one";
 
 const TRIALS_HELP: &str = "\
-Prints MOTA, IDF1, position errors, and how often everybody is tracked in all frames, with intervals
-over the draws, and how much each pipeline gains over the last one on the same draws.
+Prints MOTA, IDF1, position errors, and how often all people are tracked in all frames, with intervals
+over the draws, and the gain of each pipeline over the last one on the same draws.
 
 Examples:
   tagalong trials
@@ -266,13 +266,13 @@ Examples:
 
 const RUN_HELP: &str = "\
 Files: tracks.mcap (for `tagalong view`, Foxglove and Rerun), tracks.csv (MOTChallenge columns,
-pixels), tracks-metres.csv, joints.csv (where a pose network runs), report.json (what was dropped and
+pixels), tracks-metres.csv, joints.csv (if a pose network runs), report.json (what was dropped and
 why), timings.json, origin.json, with --smoothed tracks-smoothed.csv, and with --overlay
 overlay/000001.png and so on.
 
 Examples:
   tagalong run --overlay --overwrite       (built-in config, simulated log)
-  tagalong run robot.mcap                  (the pipeline for what the log has)
+  tagalong run robot.mcap                  (selects a pipeline for the sensors)
   tagalong run depth-verified robot.mcap   (a built-in pipeline, from any folder)
   tagalong run my-pipeline.toml robot.mcap -o out --overlay --overwrite
   tagalong run robot.mcap --with-images    (tracks.mcap with the images, for Foxglove)
@@ -285,8 +285,8 @@ Examples:
   tagalong config all --format markdown";
 
 const SCHEMA_HELP: &str = "\
-A config whose first line is `#:schema tagalong.json` is checked and completed while it is written, by
-editors that know Taplo.
+Editors with Taplo check and complete a config while you write it, if its first line is
+`#:schema tagalong.json`.
 
 Example:
   tagalong schema > tagalong.json";
@@ -303,7 +303,7 @@ Examples:
   tagalong check configs/depth-ekf.toml robot.mcap";
 
 const BENCH_HELP: &str = "\
-Without a step: plans, runs and reports. Results are kept under a hash of everything they depend
+Without a step it plans, runs and reports. Results are kept under a hash of everything they depend
 on; running again computes only what is missing. docs/reference/figures.md defines each figure.
 
 Examples:
@@ -315,16 +315,16 @@ Examples:
   tagalong bench export -o bench --trackeval tree";
 
 const EVAL_HELP: &str = "\
-Prints the figures of the field (HOTA, MOTA, IDF1, LAMR, OSPA, position errors), whose rules the
-truth was read with, and notes on what was read in another way than it may be meant; --format json
-prints one flat object. Of MOTChallenge text is refused, with its line, what TrackEval refuses: a
-class that is none in truth, tracks of other classes than people, ids below 0, frames beyond
-seqLength. Boxes without an area match nobody, and are counted. docs/reference/figures.md defines each
-figure: what it is, its range, and which way is better.
+Prints the usual metrics (HOTA, MOTA, IDF1, LAMR, OSPA, position errors), the rules by which the truth
+was read, and notes on input that may have been misread; --format json prints one flat object.
+MOTChallenge text is refused, with its line, for the same errors as in TrackEval: an unknown class in
+truth, tracks of other classes than people, ids below 0, frames beyond seqLength. Boxes without an area
+match no person, and are counted. docs/reference/figures.md defines each figure, its range, and which
+direction is better.
 
---repairs prints what HOTA, MOTA and IDF1 would be if one kind of error were gone and all else stayed:
-the largest gain tells what to work on. Reports and people whose boxes overlap by a tenth count as
-pairs there, so that a badly placed box is no false report beside a missed person.
+--repairs prints what HOTA, MOTA and IDF1 would be if one kind of error were gone and everything else
+stayed: the largest gain shows what to work on. Tracks and people whose boxes overlap by a tenth count
+as pairs there, so that a badly placed box is not both a false positive and a miss.
 
 Examples:
   tagalong eval --truth robot.people.csv --tracks runs/robot-depth-ekf
@@ -333,7 +333,7 @@ Examples:
   tagalong eval --truth MOT17-04/gt/gt.txt --tracks MOT17-04.txt --format json | jq .HOTA";
 
 const SIMULATE_HELP: &str = "\
-Same scene and seed, same bytes.
+The same scene and seed give the same bytes.
 
 Examples:
   tagalong simulate configs/scenes/crossing.toml
@@ -342,9 +342,9 @@ Examples:
   tagalong simulate configs/scenes/crossing.toml --gallery pictures";
 
 const TRAIN_HELP: &str = "\
-Candidates are what the template detector proposes in simulated rooms and annotated logs. Same seed and
-data, same bytes. The card beside the model has the counts, the cross-validation and the figures on
-held-out rooms and logs. Trainers are in programs that are built with `--features train`.
+The template detector proposes the candidates in simulated rooms and annotated logs. The same seed and
+data give the same bytes. The card beside the model has the counts, the cross-validation and the
+figures on held-out rooms and logs. Trainers need a program that is built with `--features train`.
 
 Examples:
   tagalong train svm-patch --quick -o quick.toml

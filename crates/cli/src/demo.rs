@@ -28,7 +28,7 @@ pub struct DemoArgs {
     /// Output folder.
     #[arg(short, long, value_name = "DIR", default_value = "tagalong-demo")]
     pub output: PathBuf,
-    /// Replace the files of an earlier demo in the same directory.
+    /// Replace the files of an earlier demo in the same folder.
     #[arg(long)]
     pub overwrite: bool,
     /// Use another random seed: appearance, furniture, noise.

@@ -35,7 +35,7 @@ pub fn main_with(register: impl FnOnce(&mut Registry)) -> ExitCode {
 }
 
 /// Runs the whole program with these arguments, of which the first is its name, and returns the exit
-/// code. A command line of wrong usage is told, and is 2; `--help` is printed, and is 0.
+/// code: 2 for wrong usage, which is reported, and 0 for `--help`, which is printed.
 pub fn main_from(
     arguments: impl IntoIterator<Item = OsString>,
     register: impl FnOnce(&mut Registry),

@@ -9,7 +9,7 @@ use tagalong_app::input_args::InputArgs;
 #[command(allow_missing_positional = true)]
 pub struct DoctorArgs {
     /// The pipeline, a TOML file or the name of a built-in one [default: the recommended ones that
-    /// fit the log, one after the other].
+    /// fit the log, in turn].
     pub config: Option<PathBuf>,
     /// The log: MCAP, `.db3`, `.bag`, or the folder of a bag.
     #[arg(required = true)]
@@ -38,11 +38,11 @@ pub struct DoctorArgs {
 /// Occasion for trying other settings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Trying {
-    /// Where tracks and things that come and go do not agree.
+    /// If tracks and shapes that come and go disagree.
     #[default]
     Auto,
     /// Always.
     Always,
-    /// Never: a log is passed once.
+    /// Never: the log is read once.
     Never,
 }

@@ -70,16 +70,15 @@ pub struct ImportArgs {
     /// images: metres per unit of depth.
     #[arg(long, value_name = "M", default_value_t = 0.001, requires = "depth", value_parser = positive)]
     pub depth_unit: f64,
-    /// images: boxes of whole people in them, as JSON of COCO (image_id, bbox, track_id) or as a CSV with
-    /// a header (image, x, y, w, h or image, xmin, ymin, xmax, ymax, and track_id): writes
+    /// images: boxes of whole people in them, as COCO JSON (image_id, bbox, track_id) or as CSV with a
+    /// header (image, x, y, w, h or image, xmin, ymin, xmax, ymax, and track_id): writes
     /// NAME.boxes.csv beside the log.
     #[arg(long, value_name = "FILE")]
     pub boxes: Option<PathBuf>,
-    /// cvat: boxes are of whole bodies, of which the upper bodies are compared: writes
-    /// NAME.boxes.csv.
+    /// cvat: the boxes are of whole bodies, whose upper bodies are compared: writes NAME.boxes.csv.
     #[arg(long)]
     pub whole_bodies: bool,
-    /// leg-tracker: topic of the annotated scans, where the bag has several.
+    /// leg-tracker: topic of the annotated scans, if the bag has several.
     #[arg(long, value_name = "TOPIC")]
     pub scan: Option<String>,
     /// Output format of the result.

@@ -58,7 +58,7 @@ pub struct SimulateArgs {
     /// Threads that render; the log is the same [default: as many as there are].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     pub threads: Option<u8>,
-    /// Replace the log if it is there.
+    /// Replace the log if it exists.
     #[arg(long)]
     pub overwrite: bool,
     /// Output format of the result.

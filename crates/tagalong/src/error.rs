@@ -2,10 +2,10 @@ use std::fmt;
 
 use tagalong_pipeline::{BuildError, EnrollmentError, MissingSource, StepError};
 
-/// Failure of a pipeline, a log, or a frame. Its text names the thing, the cause and the remedy; of a
-/// config also the file and the line.
+/// Failure of a pipeline, a log, or a frame. Its text names the object, the cause and the remedy; for
+/// a config also the file and the line.
 ///
-/// The form for debugging is the same text, because `fn main() -> tagalong::Result<()>` prints that.
+/// The `Debug` form is the same text, because `fn main() -> tagalong::Result<()>` prints that.
 #[derive(thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -16,7 +16,7 @@ pub enum Error {
     #[cfg(feature = "logs")]
     #[error(transparent)]
     Log(#[from] tagalong_log::LogError),
-    /// A log of which part was lost; the frames before this error are those that are intact.
+    /// A log that is partly lost; the frames before this error are intact.
     #[cfg(feature = "logs")]
     #[error(
         "`{}`: part of the log was lost: {notes}; record it again or look for a whole copy, or accept \
@@ -29,10 +29,10 @@ pub enum Error {
         /// Lost part of the log, and its place.
         notes: String,
     },
-    /// A controller is to drive without a source of data that it needs.
+    /// A controller lacks a source of data that it needs to drive.
     #[error(transparent)]
     Source(#[from] MissingSource),
-    /// Images, a pose or a scan that make no frame.
+    /// Images, a pose or a scan from which no frame can be made.
     #[error("the frame at {stamp} s: {why}")]
     Frame {
         /// Time of the frame.

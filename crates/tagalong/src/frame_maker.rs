@@ -13,8 +13,8 @@ use crate::{Error, Result};
 /// Standard deviation of odometry as a fraction of the travel, as in logs.
 const ODOMETRY_SIGMA: f64 = 0.02;
 
-/// Maker of frames from images, scans and poses of the caller: it counts them, and turns the poses of
-/// the robot into the motion between two frames.
+/// Maker of frames from images, scans and poses of the caller. It numbers the frames, and turns the
+/// poses of the robot into the motion between two frames.
 #[derive(Clone, Debug)]
 pub struct FrameMaker {
     camera: Arc<Camera>,
@@ -39,12 +39,12 @@ pub struct Moment<'m> {
 }
 
 impl FrameMaker {
-    /// Creates a maker of frames whose images a camera takes.
+    /// Creates a maker of frames with images of this camera.
     pub fn new(camera: impl Into<Arc<Camera>>) -> Self {
         Self { camera: camera.into(), odometry_sigma: ODOMETRY_SIGMA, count: 0, previous: None }
     }
 
-    /// Creates a maker of frames without images, of a laser scanner alone.
+    /// Creates a maker of frames without images, for example of a laser scanner only.
     pub fn without_camera() -> Self {
         Self::new(Camera::blind(Isometry3::identity()))
     }
@@ -54,7 +54,7 @@ impl FrameMaker {
         Self { odometry_sigma, ..self }
     }
 
-    /// Begins the frame of a time.
+    /// Begins the frame of this time.
     pub fn at(&mut self, stamp: Stamp) -> Moment<'_> {
         Moment {
             stamp,
@@ -124,7 +124,7 @@ impl Moment<'_> {
         self
     }
 
-    /// Adds all images at once, in place of those that were added before.
+    /// Adds all images at once; they replace those that were added before.
     pub fn images(mut self, images: Images) -> Self {
         self.images = images;
         self
@@ -135,9 +135,9 @@ impl Moment<'_> {
         self.sensor(scan)
     }
 
-    /// Adds the reading of any other sensor, in place of one of the same type: of a sensor of the
-    /// program's own, which implements [`Sensor`], or of one that has no function here. Plugins that
-    /// declare [`Sensor::INPUT`] find it by `Frame::sensor`.
+    /// Adds the reading of any other sensor, and replaces one of the same type. The type is one of the
+    /// program's own that implements [`Sensor`], or one of Tagalong that has no function here. Plugins
+    /// that declare [`Sensor::INPUT`] read it with `Frame::sensor`.
     ///
     /// ```
     /// use tagalong::prelude::*;
@@ -159,13 +159,13 @@ impl Moment<'_> {
         self
     }
 
-    /// Adds the pose of the robot in the odometry frame. Without one the robot counts as standing.
+    /// Adds the pose of the robot in the odometry frame. Without one the robot is assumed to be at rest.
     pub fn pose(mut self, odom_from_robot: Isometry2<f64>) -> Self {
         self.pose = Some(odom_from_robot);
         self
     }
 
-    /// Sets the age of the odometry from which the pose is, s; 0 if it is not called. A robot is not
+    /// Sets the age of the odometry that the pose comes from, s; 0 if this is not called. A robot is not
     /// steered by old odometry.
     pub fn odometry_age_s(mut self, age_s: f64) -> Self {
         self.odometry_age_s = age_s;

@@ -20,7 +20,7 @@ pub struct Log {
 #[non_exhaustive]
 pub struct LogSettings {
     /// `[input]`: topics and frames of the images, with the sources of obstacles that the collision
-    /// monitor asks for.
+    /// monitor uses.
     pub input: InputSettings,
     /// `[limits]`: largest sizes of a log's parts.
     pub limits: Limits,
@@ -53,13 +53,13 @@ impl Log {
         &self.path
     }
 
-    /// Returns the frames for a pipeline: with the inputs that it declares, under the tables `[input]`
-    /// and `[limits]` of its config. The log is read once without decoding images, so that everything
-    /// that it lacks is known before the first frame.
+    /// Returns the frames for a pipeline: with the inputs that it declares, read with `[input]` and
+    /// `[limits]` of its config. The log is scanned once without decoding images, so that missing
+    /// inputs are known before the first frame.
     ///
     /// # Errors
     /// A log that lacks a topic or a calibration, a mistake in the two tables, and a controller
-    /// without a sensor of obstacles or without odometry.
+    /// without an obstacle sensor or without odometry.
     pub fn frames(&self, pipeline: &Pipeline) -> Result<Frames> {
         let frames = self.frames_for(pipeline, pipeline.inputs())?;
         pipeline.check_sources(frames.sources())?;
@@ -67,8 +67,8 @@ impl Log {
     }
 
     /// Returns the frames as [`Log::frames`] does, with other inputs than those that the pipeline
-    /// declares, for a caller that looks at more images. Whether a controller has what it needs is for
-    /// the caller to check, with [`Pipeline::check_sources`].
+    /// declares, for a caller that uses more images. The caller has to check with
+    /// [`Pipeline::check_sources`] that a controller has its sources of data.
     ///
     /// # Errors
     /// As for [`Log::frames`].

@@ -1,7 +1,7 @@
-//! Names of nearly every program: `use tagalong::prelude::*;`.
+//! Names that nearly every program needs: `use tagalong::prelude::*;`.
 //!
-//! [`Result`] is that of this crate. Plugins return the `Result` of [`crate::core`], which is
-//! [`PluginResult`] here.
+//! [`Result`] is the one of this crate. Plugins return the `Result` of [`crate::core`], which is
+//! called [`PluginResult`] here.
 
 #[cfg(feature = "logs")]
 pub use crate::logs::{Frames, Log};

@@ -75,8 +75,8 @@ pub struct ViewArgs {
     /// Show frames up to this time, in seconds since the first.
     #[arg(long, value_name = "S")]
     pub to: Option<f64>,
-    /// Size of the page, in megabytes: images become smaller, and frames are left out evenly where
-    /// that does not suffice [default: 25; 6 for each of many rides].
+    /// Size of the page, in megabytes: images become smaller, and if that does not suffice, frames are
+    /// left out evenly [default: 25; 6 for each of many rides].
     #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub max_mb: Option<u32>,
     /// Write an animation (GIF) of the pictures of `run --overlay` instead of the page.
@@ -126,9 +126,9 @@ impl ViewArgs {
 
 /// Examples for `tagalong view --help`.
 pub const HELP: &str = "\
-The page has a time line, the images with boxes, numbers and trails, a plan from above, the funnel of
-each frame and a list of events. A click on an image says which tests dropped candidates there, and
-which settings decide them. It is one file, and works without a network.
+The page has a time line, the images with boxes, IDs and trails, a plan from above, the funnel of each
+frame and a list of events. A click on an image shows which tests dropped candidates there, and the
+settings that decide these tests. The page is one file and works offline.
 
 Examples:
   tagalong run robot.mcap && tagalong view runs/robot-depth-verified

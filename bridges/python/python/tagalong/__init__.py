@@ -86,11 +86,11 @@ def run(
 ):
     """Run a pipeline over a log, as `tagalong run`, and return its report.json as a dict.
 
-    config: a TOML file or the name of a built-in one; None takes the one for what the log has.
+    config: a TOML file or the name of a built-in one; None selects one for the sensors in the log.
     out: the folder of results, which must not exist without `overwrite`. `overlay` adds a picture
     per frame, `with_images` the images to tracks.mcap (for Rerun and Foxglove), `smoothed` the file
-    tracks-smoothed.csv. With `strict` a log of which something was lost raises TagalongError.
-    `camera` names one of several cameras. Ctrl-C stops the run; the files are whole then.
+    tracks-smoothed.csv. With `strict` a log with lost data raises TagalongError.
+    `camera` names one of several cameras. Ctrl-C stops the run and leaves valid files.
     """
     _tagalong.run(
         config,
@@ -123,10 +123,10 @@ def eval(
 
     truth: MOTChallenge text, people.csv, KITTI labels, or a log with truth. tracks: the folder of a
     run, tracks-metres.csv, MOTChallenge text or KITTI labels. similarity: "iou" of boxes, or
-    "metres" on the floor. log: the log of the truth, for its stamps [default: that of the run, where it
-    was or beside the truth]. repairs: also return, as
-    "repairs", HOTA, MOTA and IDF1 if one kind of error were repaired. drop_doubled_ids: keep the
-    first person with an ID in each frame of the truth, where it is an error otherwise.
+    "metres" on the floor. log: the log of the truth, for its stamps [default: that of the run, at its
+    path or beside the truth]. repairs: also return, as "repairs", HOTA, MOTA and IDF1 if one kind of
+    error were repaired. drop_doubled_ids: keep the first person with an ID in each frame of the
+    truth; otherwise a second one is an error.
     """
     return _json.loads(
         _tagalong.scores(
@@ -147,8 +147,8 @@ def read_tracks(path, *, smoothed=False):
 
     path: the folder of a run (tracks-metres.csv, and the boxes of tracks.csv as box_x, box_y,
     box_width, box_height, score; NaN where a track has no box), tracks-metres.csv, or MOTChallenge
-    text. Rows with `seen` False are predicted: nothing was detected there. smoothed: of the folder of
-    a run, the boxes of tracks-smoothed.csv alone, with the IDs put right.
+    text. Rows with `seen` False are predicted: nothing was detected there. smoothed: only the
+    boxes of tracks-smoothed.csv in the folder of a run, with corrected IDs.
     `pandas.DataFrame(read_tracks(path))` is a table of it.
     """
     path = _os.fspath(path)

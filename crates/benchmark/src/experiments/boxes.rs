@@ -40,10 +40,10 @@ const COLUMNS: [&str; 8] = [
 
 /// Text of `--help` after the arguments.
 pub const HELP: &str = "\
-A sequence is a folder with seqinfo.ini and gt/gt.txt, as the MOTChallenge has them; its boxes are
-those of det/det.txt beside, or of BOXES/NAME/det.txt or BOXES/NAME.txt. No image is read.
+A sequence is a folder with seqinfo.ini and gt/gt.txt, as in the MOTChallenge; its boxes are in
+det/det.txt of the folder, or in BOXES/NAME/det.txt or BOXES/NAME.txt. No image is read.
 
-With --leave-one-out the settings in `[tune]` of a config are chosen by all other sequences, and
+With --leave-one-out the settings in `[tune]` of a config are chosen on all other sequences, and
 scored in this one. Sequences of one place, whose names agree up to the first hyphen, are left out
 together.
 
@@ -64,18 +64,18 @@ pub struct BoxesArgs {
     /// The pipelines [default: configs/recorded.toml].
     #[arg(long, num_args = 1.., value_name = "CONFIG")]
     pub configs: Vec<PathBuf>,
-    /// Of several people of a truth with one ID in a frame keep the first, and count the others.
+    /// Keep the first of several people with the same ID in a frame of a truth, and count the others.
     #[arg(long)]
     pub drop_doubled_ids: bool,
-    /// Chooses settings by the other sequences.
+    /// Chooses settings on the other sequences.
     #[arg(long)]
     pub leave_one_out: bool,
     /// The objective: the mean of this figure over the places is maximised.
     #[arg(long, value_enum, default_value_t = Objective::HotaAndIdf1)]
     pub objective: Objective,
-    /// Most settings that are tried for a pipeline: all combinations where they are so few, otherwise
-    /// a sample. Those of the config are scored beside them and chosen only if they are among them;
-    /// with 1 they are all there is.
+    /// Most settings that are tried for a pipeline: all combinations if there are no more, otherwise a
+    /// sample. Those of the config are scored, too, but chosen only if they are among them; with 1 only
+    /// those of the config are scored.
     #[arg(long, value_name = "N", default_value_t = 100,
           value_parser = clap::value_parser!(u16).range(1..=10_000))]
     pub budget: u16,
@@ -85,8 +85,8 @@ pub struct BoxesArgs {
     /// Runs at once; the results are the same [default: as many as there are cores].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     pub jobs: Option<u8>,
-    /// Writes the tracks to CONFIG/SEQUENCE.txt in this folder; those with the settings that the
-    /// other sequences chose to CONFIG-left-out/SEQUENCE.txt.
+    /// Writes the tracks to CONFIG/SEQUENCE.txt in this folder; those with the settings
+    /// chosen on the other sequences to CONFIG-left-out/SEQUENCE.txt.
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
     /// Output format.

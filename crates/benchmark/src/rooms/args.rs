@@ -8,8 +8,8 @@ use crate::folder::FolderArgs;
 
 /// Text of `--help` after the arguments.
 pub const HELP: &str = "\
-For each room the settings in `[tune]` of a config are chosen by the other rooms, and scored in this
-one. All rooms choose among the same settings, so each of them runs once on each log; results are
+For each room the settings in `[tune]` of a config are chosen on the other rooms, and scored in this
+one. The candidates are the same for all rooms, so each of them runs once on each log; results are
 kept under a hash of everything they depend on, and running again computes only what is missing.
 
 Examples:
@@ -30,21 +30,21 @@ pub struct RoomsArgs {
     /// Folder of the logs [default: the `folder` that the rooms name].
     #[arg(long, value_name = "DIR")]
     pub logs_dir: Option<PathBuf>,
-    /// The objective: the mean of this figure over the rooms, weighed by their annotated people, is
+    /// The objective: the mean of this figure over the rooms, weighted by their annotated people, is
     /// maximised.
     #[arg(long, value_enum, default_value_t = Objective::Hota)]
     pub objective: Objective,
-    /// Most settings that are tried for a pipeline: all combinations where they are so few, otherwise
-    /// a sample. Those of the config are scored beside them and chosen only if they are among them;
-    /// with 1 they are all there is.
+    /// Most settings that are tried for a pipeline: all combinations if there are no more, otherwise a
+    /// sample. Those of the config are scored, too, but chosen only if they are among them; with 1 only
+    /// those of the config are scored.
     #[arg(long, value_name = "N", default_value_t = 32,
           value_parser = clap::value_parser!(u16).range(1..=10_000))]
     pub budget: u16,
     /// Seed of the sample.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// Samples, of this seed and of those after it: the tables have the first one, and say how far its
-    /// figures lie from those of the others. Without effect where all combinations are tried.
+    /// Samples, with this seed and those after it: the tables show the first one, and how far its
+    /// figures are from those of the others. No effect if all combinations are tried.
     #[arg(long, value_name = "N", default_value_t = 3,
           value_parser = clap::value_parser!(u8).range(1..=100))]
     pub samples: u8,

@@ -30,8 +30,8 @@ pub struct EvalArgs {
     /// Similarity measure: boxes in the image, or positions on the floor.
     #[arg(long, value_enum, default_value_t)]
     pub similarity: SimilarityChoice,
-    /// The log of the truth, for stamps and the camera's pose [default: the one that the run names,
-    /// where it was or beside the truth, or after which the truth is named].
+    /// The log of the truth, for stamps and the camera's pose [default: the one that the run names, at
+    /// its path or beside the truth, or the one after which the truth is named].
     #[arg(long, value_name = "LOG")]
     pub log: Option<PathBuf>,
     /// Read that log with the `[input]` and `[limits]` of this config.
@@ -40,17 +40,17 @@ pub struct EvalArgs {
     /// Rules by which MOTChallenge truth is read.
     #[arg(long, value_enum, default_value_t)]
     pub rules: RulesChoice,
-    /// The truth's boxes are whole bodies; compare the upper bodies of them.
+    /// The truth has boxes of whole bodies; compare their upper bodies.
     #[arg(long)]
     pub upper_body: bool,
-    /// Of several people of the truth with one ID in a frame keep the first, and count the others.
+    /// Keep the first of several people with the same ID in a frame of the truth, and count the others.
     #[arg(long)]
     pub drop_doubled_ids: bool,
-    /// Also print HOTA, MOTA and IDF1 if one kind of error were repaired: IDs, false reports, misses,
-    /// and where the boxes are.
+    /// Also print HOTA, MOTA and IDF1 if one kind of error were repaired: IDs, false positives,
+    /// misses, and positions and sizes of boxes.
     #[arg(long)]
     pub repairs: bool,
-    /// Frames per second where no file states them [default: 30; KITTI 10].
+    /// Frames per second, if no file states them [default: 30; KITTI 10].
     #[arg(long, value_name = "HZ")]
     pub rate: Option<f64>,
     /// Output format.
@@ -64,7 +64,7 @@ pub enum SimilarityChoice {
     /// Intersection over union of the boxes.
     #[default]
     Iou,
-    /// Distance on the floor: 1 at the same place, 0 a metre away.
+    /// Distance on the floor: 1 at the same position, 0 a metre away.
     Metres,
 }
 

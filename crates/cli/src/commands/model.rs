@@ -57,8 +57,8 @@ pub struct ModelArgs {
     /// installed.
     #[arg(long, conflicts_with_all = ["file", "install", "export", "output", "size"])]
     list: bool,
-    /// Install the file for this user: `run LOG` takes it for a log with colour alone, and a config
-    /// names it (`model = "yolox-nano"`).
+    /// Install the file for this user: `run LOG` uses it for a log with colour only, and configs can
+    /// name it (`model = "yolox-nano"`).
     #[arg(long, conflicts_with_all = ["export", "output", "format"])]
     install: bool,
     /// Name of the installed network [default: that of a known network, or of the file].
@@ -71,8 +71,8 @@ pub struct ModelArgs {
     /// Write the config that runs the network into this file, and name the network relative to it.
     #[arg(short, long, value_name = "CONFIG", conflicts_with_all = ["export", "format"])]
     output: Option<PathBuf>,
-    /// Replace a config, one of an installed network that was edited, or an exported network with its
-    /// card, that exists.
+    /// Replace an existing config, the edited config of an installed network, or an exported network
+    /// and its card.
     #[arg(long)]
     overwrite: bool,
     /// Write the network of this plugin into the file, and its card beside it, instead of reading
@@ -83,7 +83,7 @@ pub struct ModelArgs {
     #[arg(long, value_name = "MODEL", requires = "export")]
     weights: Option<PathBuf>,
     /// Write an input of the exported network, and the outputs that the plugin computes for it, into
-    /// this file as JSON, so that another program can be compared.
+    /// this file as JSON, to compare another program with.
     #[arg(long, value_name = "JSON", requires = "export")]
     sample: Option<PathBuf>,
     /// Columns and rows of the input, if the file leaves them open.

@@ -15,8 +15,8 @@ fn config_help() -> String {
     let built_in = CHOICES.iter().map(|choice| choice.config).filter(|name| *name != NETWORK);
     let names: Vec<&str> = built_in.collect();
     format!(
-        "The pipeline, a TOML file or the name of a built-in one: {} and others [default: the one for \
-         what the log has]",
+        "The pipeline, a TOML file or the name of a built-in one: {} and others [default: one for \
+         the sensors in the log]",
         names.join(", ")
     )
 }
@@ -45,29 +45,29 @@ pub struct RunArgs {
         default_missing_value = "people"
     )]
     pub overlay: Option<Overlaid>,
-    /// Put the images into tracks.mcap, too, as JPEG, so that one file opens to a whole scene.
+    /// Also write the images into tracks.mcap, as JPEG, so that one file shows the whole scene.
     #[arg(long)]
     pub with_images: bool,
-    /// Write tracks-smoothed.csv, too: tracks.csv with the IDs put right that later frames showed to be
-    /// wrong. For records; a robot could not have had these IDs in time.
+    /// Also write tracks-smoothed.csv: tracks.csv with the IDs corrected that later frames showed to be
+    /// wrong. Only for recordings: on a robot these IDs would come too late.
     #[arg(long)]
     pub smoothed: bool,
     /// Replace the files of an earlier run in the same directory.
     #[arg(long)]
     pub overwrite: bool,
-    /// Fail (exit code 1) if anything of the log was lost or damaged.
+    /// Fail (exit code 1) if any part of the log was lost or damaged.
     #[arg(long)]
     pub strict: bool,
     /// Threads: 1 does everything in turn, 2 reads ahead, 3 also renders in parallel; stereo matching
-    /// takes as many at most. The results are the same.
+    /// uses at most as many. The results are the same.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     pub threads: Option<u8>,
     /// Use this seed instead of the config's.
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
-    /// Serve a page with what happens now: images with people, the plan from above, target and
-    /// command, events. On this computer alone and a free port, unless a port or an address is
-    /// given; the address that is printed is the key to the page. The run does not wait for browsers.
+    /// Serve a live page: images with people, the plan from above, target and command, events. Only on
+    /// this computer and on a free port, unless a port or an address is given; the printed address is
+    /// the key to the page. The run does not wait for browsers.
     #[arg(
         long,
         value_name = "[ADDRESS:]PORT",
@@ -77,14 +77,14 @@ pub struct RunArgs {
         value_parser = tagalong_view::parse_address
     )]
     pub serve: Option<SocketAddr>,
-    /// Take frames no faster than they were recorded, to watch the run with --serve.
+    /// Process frames no faster than they were recorded, to watch the run with --serve.
     #[arg(long)]
     pub realtime: bool,
     /// Output format of the results.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
-    /// Run once for each camera of the log, each time into a folder of the camera's name; a person
-    /// has an ID of their own in each.
+    /// Run once for each camera of the log, each time into a folder with the camera's name; a person
+    /// has a separate ID in each.
     #[arg(long, conflicts_with_all = ["camera", "serve"])]
     pub each_camera: bool,
     /// Way in which the log is read.
@@ -98,10 +98,10 @@ pub struct RunArgs {
 /// Parts that the pictures of a run show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Overlaid {
-    /// People alone.
+    /// Only people.
     #[default]
     People,
-    /// Dropped candidates and the state of the filter, too.
+    /// Also dropped candidates and the state of the filter.
     Debug,
 }
 

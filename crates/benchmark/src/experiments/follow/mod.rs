@@ -53,7 +53,7 @@ pub struct FollowArgs {
     /// The scenes; their first person is the one to follow [default: all
     /// follow-*.toml of configs/scenes].
     pub scenes: Vec<PathBuf>,
-    /// More pipelines, which ride the same scenes.
+    /// More pipelines, on the same scenes.
     #[arg(long, num_args = 1.., value_name = "CONFIG")]
     pub against: Vec<PathBuf>,
     /// Ride each scene with this many seeds ...
@@ -73,7 +73,7 @@ pub struct FollowArgs {
     #[arg(long, value_name = "FRACTION", value_parser = fraction)]
     pub drop: Option<f64>,
     /// Inject a fault, repeatable: a kind like `freeze-depth`, or `random`, from AT seconds on, for
-    /// LASTS seconds; the seed draws what is left out.
+    /// LASTS seconds; the seed decides what is left out.
     #[arg(long, value_name = "KIND[@AT[+LASTS]]")]
     pub inject: Vec<InjectedFault>,
     /// Replace a value in each scene: a dotted key, like `crowd=5`.
@@ -94,12 +94,12 @@ pub struct FollowArgs {
     /// Replace the files of earlier rides in that folder.
     #[arg(long, requires = "output")]
     pub overwrite: bool,
-    /// Write a picture of every frame into the folder of every ride, too: boxes, ids, target, plan.
+    /// Also write a picture of every frame into the folder of every ride: boxes, IDs, target, plan.
     #[arg(long, requires = "output")]
     pub overlay: bool,
-    /// Ride each scene once more with each pipeline told where people are: instead of its detectors, the
-    /// positions of all people within reach of the laser scanner and in free sight (within 5 m without
-    /// a scanner), and which of them is the target. The difference is the price of perception.
+    /// Ride each scene once more with each pipeline given the true positions instead of detections: of
+    /// all people within range of the laser scanner and in free sight (within 5 m without a scanner),
+    /// and which of them is the target. The difference is the cost of perception.
     #[arg(long, conflicts_with_all = ["approaches", "replay", "fit"])]
     pub told: bool,
     /// Print the settings [target.looks] that fit these rides best, and the calibration of the
@@ -107,22 +107,22 @@ pub struct FollowArgs {
     #[arg(long)]
     pub fit: bool,
     /// Ride this many random approaches instead: a person or a trolley comes at the robot from any
-    /// side and does not avoid it. Prints the contacts while the robot moves; with -o each of them
-    /// leaves its log. The scenes are those with a table `[approach]` [default: approach.toml].
+    /// side and does not avoid it. Prints the contacts while the robot moves; with -o their
+    /// logs are written. The scenes are those with a table `[approach]` [default: approach.toml].
     #[arg(long, value_name = "N", conflicts_with_all = ["seeds", "fit"],
           value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
     pub approaches: Option<u64>,
-    /// Ride the approach with this seed again, and tell its course; with -o it leaves its log.
+    /// Ride the approach with this seed again, and print its course; with -o its log is written.
     #[arg(long, value_name = "SEED",
           conflicts_with_all = ["approaches", "seeds", "first_seed", "split", "fit"])]
     pub replay: Option<u64>,
-    /// Inject a fault into each approach: at a time, and of a kind, that its seed draws.
+    /// Inject a fault into each approach, with a time and a kind that its seed decides.
     #[arg(long, value_enum, default_value_t)]
     pub faults: ApproachFaults,
-    /// Approaches to a robot with a laser scanner.
+    /// Presence of a laser scanner on the robot in approaches.
     #[arg(long, value_enum, default_value_t)]
     pub laser: ApproachLaser,
-    /// Print how far the probabilities of the lock can be believed, too; files always have it.
+    /// Also print how reliable the probabilities of the lock are; the files always have it.
     #[arg(long)]
     pub calibration: bool,
     /// Output format.

@@ -45,7 +45,7 @@ pub struct AlterArgs {
     /// Mirror the images, the poses and the odometry: left becomes right.
     #[arg(long)]
     mirror: bool,
-    /// Multiply depth by this.
+    /// Multiply depth by this factor.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
     scale_depth: f64,
     /// Replace this share of the pixels: colour by black or white, depth by no reading or a random one.

@@ -42,8 +42,8 @@ pub struct BlurArgs {
     /// The copy [default: LOG-blurred.mcap in the current folder].
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Folder of a run over this log; its people are blurred [default: a new run by the pipeline for
-    /// the sensors in the log].
+    /// Folder of a run over this log, whose people are blurred [default: a new run, with the pipeline
+    /// for the sensors in the log].
     #[arg(long, value_name = "DIR")]
     run: Option<PathBuf>,
     /// Replace an earlier copy.
