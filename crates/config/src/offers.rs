@@ -1,4 +1,4 @@
-//! Offers of a plugin to the applications: advice on its tests, settings that are worth a trial, those
+//! What a plugin offers to the applications: advice on its tests, settings worth trying, settings
 //! for recorded detections, and the training of its model.
 
 /// Advice on a test of the funnel that drops candidates.
