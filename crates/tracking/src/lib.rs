@@ -93,8 +93,8 @@
 //! # Invariants
 //!
 //! * Time never runs backwards for a plugin.
-//! * The ID of a track is never used twice, not even after a reset. A report gives a person who was
-//!   recognised the earlier ID ([`ReidentificationSettings`]).
+//! * The ID of a track is never used twice, not even after a reset. A report gives a recognised
+//!   person the earlier ID ([`ReidentificationSettings`]).
 //! * Nothing is dropped silently: each loss is counted in the funnel.
 //! * No number that is not finite leaves the tracker.
 //! * Coasting is not a separate mode: a predicted occlusion, a wrong rejection by a verifier and a

@@ -1,6 +1,6 @@
 //! Boxes at the trunk that the depth image shows. The box of a track is placed over the chest,
-//! which is assumed straight below the head; the chest of a person who leans, turns or carries
-//! something is elsewhere.
+//! which is assumed straight below the head; a person that leans, turns or carries something has it
+//! elsewhere.
 
 use tagalong_core::{DepthImage, Frame, Track};
 use tagalong_geometry::Rect;

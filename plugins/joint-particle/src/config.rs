@@ -77,7 +77,7 @@ settings! {
         /// Variance of each velocity component of a new track, m²/s².
         #[schemars(range(min = 0.0, max = 1e3))]
         pub initial_velocity_variance: f64 = 1.0,
-        /// For `table`, `kde`, `gp` with `marginalise = false`: two people who are weighted
+        /// For `table`, `kde`, `gp` with `marginalise = false`: two people that are weighted
         /// together keep their depth and height, as if they moved across the view. The map contains
         /// no information on these.
         pub hold_depth: bool = false,

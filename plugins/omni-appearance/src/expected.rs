@@ -1,5 +1,5 @@
-//! Image columns in which known people are expected: they separate two people who appear as one run
-//! of columns.
+//! Image columns in which known people are expected: they separate two people that appear as one
+//! run of columns.
 
 use nalgebra::{Isometry2, Point3};
 use tagalong_core::{Frame, Track};

@@ -67,7 +67,7 @@ settings! {
         /// Three standard deviations in the order of the channels, by which the pixels are divided;
         /// empty: those of the family.
         pub deviation: Vec<f32>,
-        /// How boxes become detections with a position.
+        /// Conversion of boxes to detections with a position.
         #[serde(flatten)]
         pub boxes: BoxSettings,
         /// Limits of the network.

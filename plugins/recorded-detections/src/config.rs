@@ -29,7 +29,7 @@ settings! {
         pub discover_score: Option<f64>,
         /// Meaning of the score.
         pub score: ScoreScale = ScoreScale::Probability,
-        /// How boxes become detections with a position.
+        /// Conversion of boxes to detections with a position.
         #[serde(flatten)]
         pub boxes: BoxSettings,
         /// Standard deviation of a recorded position in space, m.

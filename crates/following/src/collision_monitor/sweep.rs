@@ -1,5 +1,5 @@
 //! Speed at which a path is free: the area that the robot sweeps until it is at rest, against
-//! static obstacles and against people who may approach meanwhile.
+//! static obstacles and against people that may approach meanwhile.
 //!
 //! For a robot of speed v that reacts after t and brakes with a, the stopping distance is
 //! `L = v t + v²/2a` and the stopping time `T = t + v/a`. A static obstacle is clear if the robot
@@ -7,7 +7,7 @@
 //! stopping time, and until the wheels are at rest after it, a person may come nearer by
 //! `reach(T)`; with full speed u from the start this is the distance of ISO 13855,
 //! `S = (u + v) t + u v/a + v²/2a + C`, where C is `protective_m`. A turn in place brings the robot
-//! no nearer to a person, who is expected to keep their present speed.
+//! no nearer to a person; the person is expected to keep their present speed.
 
 use nalgebra::Point2;
 use tagalong_core::Reason;

@@ -1,7 +1,7 @@
 //! Target lock: the choice of the person to follow, and their recovery after a loss.
 //!
 //! A track is not a person. When people occlude each other a track may switch to the wrong one, and
-//! a person who returns gets a new ID. The lock therefore remembers the appearance of the person,
+//! a returning person gets a new ID. The lock therefore remembers the appearance of the person,
 //! compares it with the followed track, and reports its confidence in every frame. It returns to a
 //! track only on evidence in several consecutive frames, and only if the person can have moved
 //! there. It never returns to a track that was seen at the same time as the person, nor to one at

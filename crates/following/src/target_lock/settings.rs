@@ -9,9 +9,9 @@ settings! {
         /// ID of the track to follow; if left out, `choose` picks one.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub track: Option<u32>,
-        /// Choice of a person while there is none: "nearest" in front; "approach", the one who
-        /// walks up to the robot and stops in front of it; "raised-hand", the one who raises a hand
-        /// above the head, with a detector that finds joints; or "none", which waits for an
+        /// Choice of a person while there is none: "nearest" in front; "approach", the one that
+        /// walks up to the robot and stops in front of it; "raised-hand", the one that raises a
+        /// hand above the head, with a detector that finds joints; or "none", which waits for an
         /// enrollment.
         pub choose: ChoiceRule = ChoiceRule::Nearest,
         /// Largest bearing of a track that may be chosen, to either side, degrees.
@@ -28,7 +28,7 @@ settings! {
         /// bearing, replaces the chosen one, s. An enrolled person is kept in any case.
         #[schemars(range(min = 0.0, max = 10.0))]
         pub reconsider_s: f64 = 0.0,
-        /// Distance within which a person who walks up to the robot has to stop, m.
+        /// Distance from the robot within which an approaching person has to stop, m.
         #[schemars(range(min = 0.5, max = 5.0))]
         pub approach_within_m: f64 = 2.0,
         /// Distance by which that person has to come nearer, m.

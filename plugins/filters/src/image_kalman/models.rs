@@ -3,7 +3,7 @@
 //! Transactions on Automatic Control 33(8), 1988).
 //!
 //! A person walks steadily most of the time. A filter with little process noise averages the
-//! detections then, but loses a person who stops; a filter with much process noise follows that
+//! detections then, but loses a person that stops; a filter with much process noise follows that
 //! person, but also every error of a detector. Two filters, weighted by the likelihoods of the
 //! detections, do both.
 
