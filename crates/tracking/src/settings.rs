@@ -82,7 +82,7 @@ settings! {
         pub min_gap_sigmas: f64 = 3.0,
         /// Width of a body, m. The detection of a half-hidden person covers the visible half, so
         /// its centre is off by up to half the width of the hidden part, and its covariance is
-        /// increased by that. 0: it is not.
+        /// increased by that. 0: no increase.
         #[schemars(range(min = 0.0))]
         pub body_width_m: f64 = 0.0,
     }

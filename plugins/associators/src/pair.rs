@@ -38,7 +38,8 @@ pub struct GateSettings {
     /// of freedom.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub gate: f64,
-    /// For `mahalanobis`: largest distance on the floor, m, between frames that are close in time.
+    /// Largest distance on the floor, m, between frames that are close in time; only with the
+    /// Mahalanobis distance as cost.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub gate_m: f64,
     /// Growth of `gate_m` with the time between the frames, m/s.
