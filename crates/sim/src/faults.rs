@@ -23,15 +23,15 @@ const DRAWN_BETWEEN: [f64; 2] = [0.2, 0.6];
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum FaultKind {
-    /// The depth image repeats itself with new stamps, while colour goes on.
+    /// The depth image is repeated with new stamps, while colour continues.
     FreezeDepth,
-    /// All images of the camera repeat themselves with new stamps.
+    /// All images of the camera are repeated with new stamps.
     FreezeAll,
-    /// The scan of the laser scanner repeats itself with new stamps.
+    /// The scan of the laser scanner is repeated with new stamps.
     FreezeLaser,
     /// The depth image has no reading at all.
     BlankDepth,
-    /// Each pixel of the depth image has the largest number, 65.535 m.
+    /// Each pixel of the depth image has the largest value, 65.535 m.
     SaturateDepth,
     /// Only `share` of the columns of the depth image have readings.
     DarkColumns,
@@ -39,7 +39,7 @@ pub enum FaultKind {
     NoiseDepth,
     /// Rays of the laser scanner ahead are NaN, 0 or infinite: `share` of the circle.
     LaserInvalid,
-    /// Rays of the laser scanner ahead are nearer than it measures: `share` of the circle.
+    /// Rays of the laser scanner ahead are below its minimum range: `share` of the circle.
     LaserNear,
     /// Images arrive `size` seconds late.
     Delay,
@@ -49,39 +49,39 @@ pub enum FaultKind {
     Drop,
     /// The laser scanner delivers no scan.
     DropLaser,
-    /// The further sensors of obstacles (`lasers`, `ranges`, `bumpers`) repeat their readings.
+    /// The further obstacle sensors (`lasers`, `ranges`, `bumpers`) repeat their readings.
     FreezeSensors,
-    /// The further sensors of obstacles are silent.
+    /// The further obstacle sensors are silent.
     DropSensors,
-    /// The poses of the odometry are no numbers.
+    /// The poses of the odometry are not finite.
     NanOdometry,
     /// The odometry is silent.
     OdometrySilent,
-    /// The values of the odometry stay as they are, with new stamps.
+    /// The values of the odometry do not change, but its stamps do.
     OdometryFrozen,
     /// The odometry measures `size` times the motion.
     OdometryWrong,
     /// The stamps of the odometry are `size` seconds ahead.
     OdometryLateStamps,
-    /// The camera is calibrated anew: its calibration has `size` times the focal length.
+    /// The calibration of the camera changes to `size` times the focal length.
     CalibrationChanged,
-    /// The camera turns `size` degrees to the left, and the static transforms say so.
+    /// The camera turns `size` degrees to the left, and the static transforms change with it.
     MountMoved,
-    /// The camera turns `size` degrees to the left, and nothing says so.
+    /// The camera turns `size` degrees to the left, and the static transforms stay the same.
     MountKnocked,
-    /// The wheels stand, whatever is commanded.
+    /// The wheels do not turn, whatever is commanded.
     WheelsStuck,
     /// The wheels turn as commanded, but `share` of their travel is lost on the ground.
     WheelsSlip,
-    /// The base goes on with its last command.
+    /// The base keeps executing its last command.
     WheelsRunaway,
     /// Commands reach the wheels `size` seconds late.
     WheelLatency,
-    /// The clock of the robot goes back by `size` seconds.
+    /// The clock of the robot is set back by `size` seconds.
     ClockBack,
-    /// The clock of the robot goes forward by `size` seconds.
+    /// The clock of the robot is set forward by `size` seconds.
     ClockForward,
-    /// The robot is switched off and reset, and the button of the enable sticks meanwhile.
+    /// The robot is switched off and reset while the enable button is stuck.
     EnableStuck,
 }
 
