@@ -1,7 +1,7 @@
 //! Checks that a pair is rectified and not swapped.
 //!
-//! A matcher searches along rows and to one side only, so that it cannot detect either. Some
-//! distinct points of the left image are therefore searched for in all directions.
+//! A matcher only searches along rows and to one side, so that it cannot detect either mistake.
+//! Therefore some distinct points of the left image are searched for in all directions.
 
 use tagalong_core::GreyImage;
 

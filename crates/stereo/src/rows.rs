@@ -1,4 +1,4 @@
-//! Some rows of an image at a time, with its border continued outside of it.
+//! Access to some rows of an image at a time, with its border continued outside.
 
 use tagalong_core::GreyImage;
 
