@@ -17,7 +17,7 @@ const FAR_M: f32 = 8.0;
 /// Colour of dropped candidates.
 pub const DROPPED: Ink = Ink::solid([215, 215, 215]).faint(0.7);
 
-/// Part of the box of a predicted person that has to be in the image for a label.
+/// Fraction of the box of a predicted person that has to be inside the image for a label.
 const LABELLED: f64 = 0.25;
 
 const TITLE: Ink = Ink::solid([255, 255, 255]);
@@ -65,7 +65,7 @@ fn scaled(rect: &Rect, by: f64) -> Rect {
     Rect::new(by * rect.x, by * rect.y, by * rect.width, by * rect.height)
 }
 
-/// Returns the place for the labels, which spare the boxes of tracks.
+/// Returns the area of the labels, which avoid the boxes of tracks.
 fn labels(scene: &OverlayData, by: usize, style: OverlayStyle) -> Labels {
     let width = by * scene.camera.width;
     let height = by * scene.camera.height;
@@ -74,8 +74,8 @@ fn labels(scene: &OverlayData, by: usize, style: OverlayStyle) -> Labels {
     Labels::within(Rect::new(0.0, 0.0, width as f64, height as f64), spared)
 }
 
-/// Adds the labels of tracks, near to far, and, to debug, those of dropped candidates where there is
-/// room.
+/// Adds the labels of tracks, nearest first, and, for debugging, those of dropped candidates where
+/// there is room.
 pub fn add_labels(labels: &mut Labels, scene: &OverlayData, by: usize, style: OverlayStyle) {
     let lettering = Lettering::of_width(by * scene.camera.width);
     let area = Rect::new(0.0, 0.0, scene.camera.width as f64, scene.camera.height as f64);
@@ -106,7 +106,7 @@ pub fn placed_labels(scene: &OverlayData, style: OverlayStyle) -> Labels {
 }
 
 /// Renders the box of a track, thick if it is seen and thin if it is only predicted, with a dark
-/// rim that sets it off from bright images.
+/// rim that makes it visible on bright images.
 pub fn draw_box(canvas: &mut Canvas, region: &Rect, seen: bool, ink: Ink) {
     // A person that another sensor sees has no box.
     if region.width <= 0.0 {
@@ -175,7 +175,7 @@ impl ImageView {
         }
     }
 
-    /// Renders one map with its title, above `bottom`; returns its place.
+    /// Renders one map with its title, above `bottom`; returns its area.
     fn draw_map(&mut self, map: &SketchMap, bottom: f64) -> Rect {
         let columns = map.columns.max(1);
         let cell = CELL_PX * self.scale;
@@ -252,7 +252,7 @@ fn dropped(scene: &OverlayData) -> Vec<(Rect, String)> {
     all
 }
 
-/// Returns the number of a track, whether it is the target, its state, and its distance from the robot.
+/// Returns the ID of a track, whether it is the target, its state, and its distance from the robot.
 fn name_of(track: &Track, is_target: bool) -> String {
     let target = if is_target { " target" } else { "" };
     let state = match (track.confirmed, track.seen) {

@@ -8,13 +8,13 @@ use super::labels::Labels;
 use super::style::{LEAST_REACH_M, OverlayStyle, colour, colour_of};
 use super::trails::Trails;
 
-/// Reach of the view behind the robot, as a part of that ahead.
+/// Reach of the view behind the robot, as a fraction of that ahead.
 const BEHIND: f64 = 0.125;
 
-/// Reach of the view ahead of the robot and behind it where people are seen on all sides, m.
+/// Reach of the view ahead of the robot and behind it if people are detected on all sides, m.
 const REACH_AROUND_M: [f64; 2] = [5.0, 4.0];
 
-/// Half the side of the square around a person that labels spare, pixels.
+/// Half the side of the square around a person that labels avoid, pixels.
 const MARK_PX: f64 = 8.0;
 
 /// Colour of the plan behind all marks.
@@ -101,7 +101,7 @@ pub fn draw(scene: &OverlayData, trails: &Trails, style: OverlayStyle, height: u
     canvas
 }
 
-/// Returns the IDs of all tracks at their places, which spare the marks of all.
+/// Returns the IDs of all tracks at positions that avoid all marks.
 fn labels(scene: &OverlayData, plan: &Plan, style: OverlayStyle, height: usize) -> Labels {
     let marks = style.tracks(scene).map(|track| plan.mark(track)).collect();
     let mut labels = Labels::within(Rect::new(0.0, 0.0, plan.width, height as f64), marks);
@@ -122,7 +122,7 @@ pub fn placed_ids(scene: &OverlayData, style: OverlayStyle, height: usize) -> La
     labels(scene, &Plan::new(height, scene.is_around, style), style, height)
 }
 
-/// Returns the words that explain the view, with their places.
+/// Returns the words that explain the view, with their positions.
 fn notes(plan: &Plan) -> [(Rect, &'static str); 2] {
     let above = "from above";
     let robot = "robot";
@@ -136,7 +136,7 @@ fn notes(plan: &Plan) -> [(Rect, &'static str); 2] {
     ]
 }
 
-/// Renders a line every metre, its number every second one.
+/// Renders a line every metre, and a number at every second line.
 fn draw_grid(canvas: &mut Canvas, plan: &Plan) {
     let [ahead_m, behind_m] = plan.reach_m;
     let sides = (0.5 * plan.width / plan.px_per_m).ceil();

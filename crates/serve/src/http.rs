@@ -1,5 +1,5 @@
-//! As much of HTTP/1.1 as a page on this computer needs: requests with bounds on everything, and
-//! an answer per connection.
+//! The subset of HTTP/1.1 that a page on this computer needs: requests with limits on everything,
+//! and one answer per connection.
 
 use serde::Serialize;
 
@@ -9,7 +9,7 @@ const HEAD_BYTES: usize = 16 << 10;
 /// End of the headers.
 const HEAD_END: &[u8] = b"\r\n\r\n";
 
-/// Most header lines.
+/// Largest number of header lines.
 const HEADERS: usize = 100;
 
 /// Request of a browser or a program.
@@ -61,7 +61,7 @@ impl Response {
         }
     }
 
-    /// Returns the refusal of a path that the site does not have.
+    /// Returns the answer for a path that the site does not have.
     pub fn not_found() -> Self {
         Self::refusal(404, "there is no such page")
     }
@@ -71,7 +71,7 @@ impl Response {
         Self { status, kind: "text/plain; charset=utf-8", body: why.into().into_bytes() }
     }
 
-    /// Returns the bytes of the answer, which says that the connection ends.
+    /// Returns the bytes of the answer, whose headers say that the connection is closed.
     pub(crate) fn into_bytes(self, head_only: bool) -> Vec<u8> {
         let Self { status, kind, body } = self;
         let reason = match status {
@@ -117,11 +117,11 @@ pub struct Incoming {
 }
 
 impl Incoming {
-    /// Takes the next bytes, and returns the request once it is whole. Its body has at most
+    /// Adds the next bytes, and returns the request once it is complete. Its body has at most
     /// `body_bytes`.
     ///
     /// # Errors
-    /// The refusal to answer with.
+    /// The answer that refuses the request.
     pub fn take(&mut self, part: &[u8], body_bytes: usize) -> Result<Option<Request>, Response> {
         // The end of the head may lie across the seam.
         let searched = self.bytes.len().saturating_sub(HEAD_END.len() - 1);

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::connections::{CONNECTIONS, THREADS};
 use super::*;
 
-/// Deadline of events that come at once, so that a server that hangs fails its test.
+/// Deadline of events that normally happen at once, so that a hanging server fails its test.
 const DEADLINE: Duration = Duration::from_secs(60);
 
 /// Times of clients that are far beyond any test: a server that waits for them hangs.
