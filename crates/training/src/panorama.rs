@@ -12,8 +12,8 @@ use tagalong_trials::Draw;
 use super::args::TrainArgs;
 use super::session::Session;
 
-/// Scene with two people, one after the other: another room, other people and another mirror with
-/// every seed.
+/// Scene with two people, one after the other; each seed gives another room, other people and
+/// another mirror.
 const ROOM: &str = include_str!("../configs/scenes/omni-room.toml");
 /// First group number of the people in other rooms.
 const STRANGER: u64 = 100;
@@ -51,7 +51,7 @@ impl Room {
     }
 }
 
-/// Simulates, fits, writes model and card.
+/// Simulates, fits, and writes the model and the card.
 ///
 /// # Errors
 /// Scenes that do not parse, too few samples, files that cannot be written.
