@@ -1,4 +1,4 @@
-//! Page data from recordings: one list of times for all runs.
+//! Page data from recordings, with one list of times for all runs.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,7 +12,7 @@ use tagalong_app::remedies::Remedies;
 
 use crate::recording::{FaultFacts, Recording};
 
-/// Returns the stamps of all frames of all runs, in their order.
+/// Returns the stamps of all frames of all runs, in order.
 pub fn stamps(runs: &[Recording]) -> Vec<u64> {
     let all: BTreeSet<u64> = runs.iter().flat_map(|run| &run.moments).map(stamp_of).collect();
     all.into_iter().collect()
@@ -28,7 +28,7 @@ pub fn times(stamps: &[u64]) -> Vec<f64> {
     stamps.iter().map(|stamp| ((stamp - first) as f64 * 1e-6).round() * 1e-3).collect()
 }
 
-/// Returns what a run says about each frame of the page, numbered from 1.
+/// Returns the data of a run for each frame of the page, numbered from 1.
 pub fn witness(run: &Recording, stamps: &[u64], depths: &[Option<Depths>]) -> Witness {
     let by_stamp: BTreeMap<u64, &Moment> = run.moments.iter().map(|m| (stamp_of(m), m)).collect();
     let mut witness = Witness::default();
@@ -42,7 +42,7 @@ pub fn witness(run: &Recording, stamps: &[u64], depths: &[Option<Depths>]) -> Wi
     witness
 }
 
-/// Returns a run on the times of the page.
+/// Returns a run, aligned with the times of the page.
 pub fn run_data(run: &Recording, stamps: &[u64], remedies: &Remedies) -> RunData {
     let by_stamp: BTreeMap<u64, &Moment> = run.moments.iter().map(|m| (stamp_of(m), m)).collect();
     let moments: Vec<Option<&Moment>> = stamps.iter().map(|s| by_stamp.get(s).copied()).collect();
@@ -66,7 +66,7 @@ pub fn run_data(run: &Recording, stamps: &[u64], remedies: &Remedies) -> RunData
 /// Kind of the events of injected faults.
 const FAULT: &str = "fault";
 
-/// Returns the begin and the end of each injected fault within the times of the page.
+/// Returns the start and the end of each injected fault within the times of the page.
 fn fault_events(faults: &[FaultFacts], times: &[f64]) -> Vec<EventData> {
     let mut events = Vec::new();
     for fault in faults {

@@ -15,7 +15,7 @@ use crate::recording::{Recording, no_frames};
 /// Writes the animation of a run.
 ///
 /// # Errors
-/// A run without pictures, a span without frames, a file that exists.
+/// A run without pictures, a span without frames, or a file that exists.
 pub fn write(args: &ViewArgs, file: &Path) -> Outcome {
     let run = [Recording::read(&args.run, &args.window()?)?];
     spare(file, args.overwrite)?;

@@ -12,10 +12,10 @@ use toml::Table;
 use crate::page::data::{CandidateData, DriveData, DroppedData, FrameData, TestData, TrackData};
 use crate::page::moment::{Moment, TrackState};
 
-/// Points kept of a laser scan.
+/// Largest number of points of a laser scan.
 const SCAN_POINTS: usize = 240;
 
-/// Returns all tests that dropped anything, with the settings that decide them.
+/// Returns all tests that dropped candidates, with the settings that decide them.
 pub fn tests<'a>(
     notes: impl Iterator<Item = &'a FrameNotes>,
     config: &Table,
@@ -102,7 +102,8 @@ fn candidate_data(note: &CandidateNote) -> CandidateData {
     }
 }
 
-/// Returns the funnel; the places of candidates are left to the candidates, which say more.
+/// Returns the funnel without the regions of candidates, because the data of the candidates have
+/// more detail.
 fn dropped_data(notes: &FrameNotes) -> Vec<DroppedData> {
     let of_candidates: BTreeSet<&str> = notes.candidates.iter().filter_map(dropping_test).collect();
     notes
