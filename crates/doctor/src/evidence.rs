@@ -1,4 +1,4 @@
-//! Input of the checks: gathered once, in one pass over the frames.
+//! Input of the checks, collected in one pass over the frames.
 
 use std::cell::OnceCell;
 use std::sync::Arc;
@@ -17,14 +17,14 @@ use super::coverage::{Alternative, Coverage};
 use super::depth_unit::JudgedDepth;
 use super::trial::Trial;
 
-/// Number of measured frames, spread over those that are read.
+/// Largest number of measured frames, spread over the frames that are read.
 const SAMPLES: u64 = 24;
 
-/// Number of depth images that are kept for a summary.
+/// Largest number of depth images that are kept for a summary.
 const KEPT_DEPTHS: usize = 8;
 
-/// Way, m, and angle, rad, beyond which the camera moves on the robot: a floor that is measured at each
-/// frame, or a loose joint, gives less.
+/// Displacement, m, and angle, rad, above which the camera counts as moving on the robot: the noise
+/// of a floor that is measured at each frame, or a loose joint, gives less.
 const CAMERA_MOVED_M: f64 = 0.05;
 const CAMERA_TURNED_RAD: f64 = 0.05;
 
@@ -34,46 +34,46 @@ pub struct Evidence {
     pub config: String,
     /// Contents of the log.
     pub inspection: Inspection,
-    /// Reason for which the pipeline lacks an input that it requires.
+    /// Reason why the pipeline lacks an input that it requires.
     pub refusal: Option<LogError>,
     /// Source that the controller lacks.
     pub missing: Option<MissingSource>,
-    /// True if the user names the config: without a name `tagalong run` takes no heed of the controller.
+    /// True if the user named the config: otherwise `tagalong run` ignores the controller.
     pub is_named: bool,
     /// `[input]` of the config.
     pub input: InputSettings,
     /// `[suits]` of the config.
     pub suits: Suits,
-    /// True if the log tells the robot's motion.
+    /// True if the log has the motion of the robot.
     pub has_odometry: bool,
     /// Inputs of the pipeline.
     pub inputs: Inputs,
     /// Measurements in frames.
     pub samples: Samples,
-    /// Judgement of the depth in them; made by the first check that needs it.
+    /// Assessment of their depth; the first check that needs it makes it.
     pub depth: OnceCell<Option<JudgedDepth>>,
-    /// Frames that could be made, and those that could not.
+    /// Numbers of frames that could be made, and of those that could not.
     pub reading: Reading,
-    /// Way of the robot.
+    /// Motion of the robot.
     pub driven: Driven,
     /// Result of the pipeline.
     pub trial: Trial,
-    /// Tracks of the pipeline against things that come and go.
+    /// Tracks of the pipeline compared with shapes that come and go.
     pub coverage: Coverage,
-    /// Causes for which shapes that come and go have no track, with their numbers, most first.
+    /// Reasons why shapes that come and go have no track, with their numbers, most frequent first.
     pub causes: Vec<(Cause, usize)>,
     /// Share of the points in depth that come and go; `None` without depth.
     pub changed: Option<f64>,
-    /// Built-in configs that fit the log, the best first; looked for where they are needed.
+    /// Built-in configs that fit the log, the best first; only searched when they are needed.
     pub fitting: Vec<&'static str>,
-    /// Result of other settings, where they were tried.
+    /// Results of other settings, if any were tried.
     pub alternatives: Vec<Alternative>,
-    /// Preparations of the images of neural networks, where the pipeline has one.
+    /// Preparations of images for neural networks, if the pipeline has one.
     pub preparations: Vec<Preparations>,
 }
 
 impl Evidence {
-    /// Returns true if height and tilt of the camera are a mere assumption.
+    /// Returns true if the height and tilt of the camera are only assumed.
     pub fn is_pose_assumed(&self) -> bool {
         self.inspection.facts.camera_source.starts_with("an assumption")
     }
@@ -82,22 +82,23 @@ impl Evidence {
 /// Result of a preparation.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Prepared {
-    /// Settings that differ from the config, as a line; empty for the config as it is.
+    /// Settings that differ from the config, as a line; empty for the config itself.
     pub change: String,
-    /// Frames in which people are found.
+    /// Number of frames in which people are found.
     pub found: usize,
-    /// Mean over the frames of the probability of the likeliest person; 0 for frames without one.
+    /// Mean over the frames of the probability of the likeliest person, which is 0 in frames
+    /// without people.
     pub score: f64,
 }
 
-/// Preparations of the images of one network.
+/// Preparations of the images for one network.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Preparations {
-    /// Frames that were tried.
+    /// Number of frames that were tried.
     pub frames: usize,
-    /// That of the config.
+    /// Preparation of the config.
     pub now: Prepared,
-    /// The best other one, with as few settings as it takes; none was tried where that of the
+    /// Best other preparation, with as few settings as possible; none is tried if that of the
     /// config finds people in most frames.
     pub best: Option<Prepared>,
 }
@@ -105,24 +106,24 @@ pub struct Preparations {
 /// Numbers of frames of a pass.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Reading {
-    /// Frames that were made.
+    /// Number of frames that were made.
     pub made: u64,
-    /// Images (or scans) until then that should have made a frame.
+    /// Number of images (or scans) until then that should have made a frame.
     pub wanted: u64,
-    /// All images (or scans) of the log.
+    /// Number of all images (or scans) of the log.
     pub in_log: u64,
 }
 
-/// Way of the robot over the examined frames, and of the camera on it.
+/// Motion of the robot, and of the camera on it, over the examined frames.
 #[derive(Clone, Debug, Default)]
 pub struct Driven {
-    /// Length of the way, m.
+    /// Length of the path, m.
     pub metres: f64,
     /// Sum of all turns, rad.
     pub turned_rad: f64,
-    /// Farthest that the camera got from its first place on the robot, m.
+    /// Largest distance of the camera from its first position on the robot, m.
     pub camera_moved_m: f64,
-    /// Largest angle that the camera turned away from its first direction on the robot, rad.
+    /// Largest angle of the camera from its first direction on the robot, rad.
     pub camera_turned_rad: f64,
     first_camera: Option<Arc<Camera>>,
 }
@@ -149,9 +150,9 @@ impl Driven {
 pub struct Scans {
     /// Number of scans.
     pub count: usize,
-    /// Reflections in all of them.
+    /// Number of reflections in all of them.
     pub readings: usize,
-    /// Highest number of a ray, plus one.
+    /// Number of rays: the highest index plus one.
     pub rays: u32,
     /// Angle between two rays, rad.
     pub increment_rad: f64,
@@ -181,27 +182,27 @@ impl Scans {
     }
 }
 
-/// Measurements of frames that are spread over the log.
+/// Measurements in frames that are spread over the log.
 pub struct Samples {
     every: u64,
     /// Number of measured frames.
     pub count: usize,
-    /// Camera of the first one.
+    /// Camera of the first measured frame.
     pub camera: Option<Arc<Camera>>,
-    /// Exposure of each.
+    /// Exposure of each measured frame.
     pub exposures: Vec<Exposure>,
     /// Some of the depth images.
     pub depths: Vec<Arc<DepthImage>>,
-    /// Overlap of the edges of depth and colour.
+    /// Overlap of edges in depth with edges in colour.
     pub overlap: EdgeOverlap,
-    /// Floor in each frame where it was found, with the camera of that frame.
+    /// Floor in each frame in which it was found, with the camera of that frame.
     pub floors: Vec<(Ground, Arc<Camera>)>,
     /// Laser scans.
     pub scans: Scans,
 }
 
 impl Samples {
-    /// Returns empty samples for about so many frames.
+    /// Creates empty samples for an expected number of frames.
     pub fn of(frames: u64) -> Self {
         Self {
             every: (frames / SAMPLES).max(1),
@@ -215,7 +216,7 @@ impl Samples {
         }
     }
 
-    /// Measures the frame if it is its turn.
+    /// Measures the frame if it is selected.
     pub fn take(&mut self, number: u64, item: &LogFrame) {
         // Scans are cheap, and the number of rays is that of the longest one.
         if let Some(scan) = item.frame.laser() {

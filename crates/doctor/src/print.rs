@@ -7,10 +7,10 @@ use super::coverage::{Alternative, Coverage};
 use super::diagnosis::{Diagnosis, Drop, Row};
 use super::finding::{Finding, Severity};
 
-/// Lines of the funnel that are shown.
+/// Largest number of lines of the funnel that are shown.
 const FUNNEL_LINES: usize = 8;
 
-/// Settings that are shown.
+/// Largest number of settings that are shown.
 const SETTING_LINES: usize = 10;
 
 /// Returns the diagnosis, for a terminal.
@@ -45,7 +45,7 @@ pub fn text(diagnosis: &Diagnosis) -> String {
     out
 }
 
-/// Writes the table of the pipelines, and names the one that is taken.
+/// Writes the table of the pipelines, and names the selected one.
 fn pipelines(out: &mut String, diagnosis: &Diagnosis) {
     if diagnosis.pipelines.is_empty() {
         return;
@@ -77,7 +77,7 @@ fn pipelines(out: &mut String, diagnosis: &Diagnosis) {
     }
 }
 
-/// Writes which pipelines take longer for a frame than the log has for it.
+/// Writes which pipelines take longer per frame than the interval between frames of the log.
 fn slow(out: &mut String, diagnosis: &Diagnosis) {
     let Some(period_ms) = diagnosis.period_ms else { return };
     let slow = diagnosis.pipelines.iter().filter(|row| row.frame_ms > period_ms);
@@ -92,11 +92,12 @@ fn slow(out: &mut String, diagnosis: &Diagnosis) {
     }
 }
 
-/// Gain of a pipeline over the one that is taken, below which it is not told.
+/// Gain of a pipeline over the selected one below which it is not mentioned.
 const MIN_GAIN: f64 = 0.03;
 
-/// Writes which pipeline misses fewer person-sized shapes on this log than the one that is taken. More
-/// is not measured: without truth, one that finds them under changing IDs looks as good.
+/// Writes which pipeline misses fewer person-sized shapes on this log than the selected one.
+/// Nothing else is measured: without truth, a pipeline that finds people under changing IDs looks
+/// equally good.
 fn better(out: &mut String, taken: &Row, rows: &[Row]) {
     let tracking = rows.iter().filter(|row| row.coverage.moving > 0);
     let best = tracking.max_by(|a, b| a.coverage.worth().total_cmp(&b.coverage.worth()));
@@ -116,7 +117,7 @@ fn better(out: &mut String, taken: &Row, rows: &[Row]) {
     }
 }
 
-/// Writes the settings that were tried.
+/// Writes the results of the settings that were tried.
 fn settings(out: &mut String, diagnosis: &Diagnosis) {
     if diagnosis.alternatives.is_empty() {
         return;
@@ -156,7 +157,7 @@ fn percent(part: f64) -> String {
     format!("{:.0} %", 100.0 * part)
 }
 
-/// Returns the meaning of the columns, by what the log has.
+/// Returns the meaning of the columns, depending on the data of the log.
 fn legend(coverage: &Coverage) -> &'static str {
     if coverage.has_depth {
         "  moving, still: tracks that moved, and that never did; boxes: in a frame; idle: boxes where\n  \
@@ -200,7 +201,8 @@ fn summary(out: &mut String, findings: &[Finding]) {
 mod tests {
     use super::*;
 
-    /// Returns the row of a pipeline with so many moving tracks and so many of 100 shapes missed.
+    /// Returns the row of a pipeline with a number of moving tracks, and a number of missed shapes
+    /// of 100.
     fn row(config: &str, moving: usize, unexplained: usize) -> Row {
         let coverage = Coverage { moving, blobs: 100, unexplained, ..Coverage::default() };
         let config = config.to_owned();

@@ -9,7 +9,7 @@ use tagalong_render::write_png;
 
 use super::trial::{Example, Trial};
 
-/// Pictures beside each other.
+/// Number of pictures in a row.
 const COLUMNS: usize = 4;
 
 /// Gap between pictures, pixels.
@@ -34,7 +34,7 @@ pub fn write(trial: &Trial, folder: &Path) -> Result<BTreeMap<&'static str, Path
     Ok(written)
 }
 
-/// Returns the test's name with only letters, digits and dashes.
+/// Returns the name of the test with only letters, digits and dashes.
 fn file_name(test: &str) -> String {
     let words = test.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
     words.collect::<Vec<_>>().join("-")

@@ -26,30 +26,30 @@ pub struct Visit {
     pub config: ConfigFile,
     /// The pipeline.
     pub pipeline: Pipeline,
-    /// Tables of the config that are not the pipeline's.
+    /// Tables of the config that the pipeline does not parse.
     pub outer: OuterSettings,
     /// Settings that the config offers for tuning.
     pub tunables: Vec<Tunable>,
     /// Everything that was measured.
     pub evidence: Evidence,
-    /// Things that come and go.
+    /// Shapes that come and go.
     pub scenery: Scenery,
 }
 
-/// Log to look at, and the extent of the look.
+/// Log of a visit, and the extent of the visit.
 #[derive(Clone, Copy)]
 pub struct Scope<'a> {
     /// The log.
     pub log: &'a Path,
-    /// Way in which it is read.
+    /// Options for reading it.
     pub input: &'a InputArgs,
     /// Number of frames.
     pub frames: u64,
-    /// True if pictures are wanted.
+    /// True if pictures are requested.
     pub with_pictures: bool,
-    /// True if the user names the config.
+    /// True if the user named the config.
     pub is_named: bool,
-    /// True if light, depth, floor and scans are measured, as the checks need them.
+    /// True if exposure, depth, floor and scans are measured for the checks.
     pub with_samples: bool,
 }
 
@@ -113,7 +113,7 @@ impl Visit {
     }
 }
 
-/// Returns the causes for which shapes that come and go have no track, most frequent first.
+/// Returns the reasons why shapes that come and go have no track, most frequent first.
 fn causes(trial: &Trial, scenery: &Scenery, rules: Rules<'_>) -> Vec<(Cause, usize)> {
     let mut counts: BTreeMap<String, (Cause, usize)> = BTreeMap::new();
     for moment in &trial.course.moments {

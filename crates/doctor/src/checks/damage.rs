@@ -1,7 +1,7 @@
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
-/// Counters of read items, as opposed to lost ones.
+/// Counters of items that were read, as opposed to lost ones.
 const NO_LOSS: [&str; 6] = [
     "chunks_verified",
     "chunks_without_crc",

@@ -6,7 +6,7 @@ use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 use super::pose::mount_lines;
 
-/// Checks that the frames of tf are connected, and that the camera's is an optical one.
+/// Checks that the frames of tf are connected, and that the frame of the camera is an optical one.
 pub fn frames(evidence: &Evidence) -> Option<Finding> {
     fn ok(measured: String) -> Option<Finding> {
         Some(Finding::new("frames", Severity::Ok, measured))
@@ -50,7 +50,7 @@ pub fn frames(evidence: &Evidence) -> Option<Finding> {
     )))
 }
 
-/// Reports that the scanner's frame is not connected to the robot's.
+/// Reports that the frame of the scanner is not connected to that of the robot.
 fn cut_scanner(evidence: &Evidence, scanner: &str) -> Finding {
     let facts = &evidence.inspection.facts;
     let robot = facts.robot_frame.as_str();
@@ -65,7 +65,7 @@ fn cut_scanner(evidence: &Evidence, scanner: &str) -> Finding {
         .remedy(remedy)
 }
 
-/// Reports that the camera's frame is not connected to the robot's.
+/// Reports that the frame of the camera is not connected to that of the robot.
 fn cut(evidence: &Evidence, camera: &str) -> Finding {
     let facts = &evidence.inspection.facts;
     let tf = &evidence.inspection.transforms;
@@ -97,7 +97,7 @@ fn cut(evidence: &Evidence, camera: &str) -> Finding {
         .remedy(remedy)
 }
 
-/// Returns the topmost frame above one.
+/// Returns the root of the tree that contains a frame.
 fn root_of(evidence: &Evidence, frame: &str) -> Option<String> {
     let tf = &evidence.inspection.transforms;
     let mut at = frame;

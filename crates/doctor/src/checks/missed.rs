@@ -2,10 +2,10 @@ use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 use super::{Alternative, better};
 
-/// Blobs below which shares mean little.
+/// Number of blobs below which shares are not significant.
 const FEW_BLOBS: usize = 3;
 
-/// Checks that shapes of the size of people that come and go have tracks.
+/// Checks that person-sized shapes that come and go have tracks.
 pub fn missed(evidence: &Evidence) -> Option<Finding> {
     let coverage = &evidence.coverage;
     evidence.changed?;
@@ -50,7 +50,7 @@ pub fn missed(evidence: &Evidence) -> Option<Finding> {
     Some(finding.remedy(remedy(evidence)))
 }
 
-/// Returns the change that helped most on this log, else a general one.
+/// Returns the change that helped most on this log, or else general advice.
 fn remedy(evidence: &Evidence) -> String {
     let now = &evidence.coverage;
     match better(evidence, |other| other.unexplained < now.unexplained) {

@@ -4,13 +4,13 @@ use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 use super::depth::is_unit_in_doubt;
 
-/// Way below which a robot stands, m: noise of the odometry adds up.
+/// Distance below which a robot counts as at rest, m, because noise of the odometry adds up.
 const STANDS_M: f64 = 0.3;
 
-/// Share of points that come and go beyond which the camera itself moves.
+/// Share of points that come and go above which the camera itself must move.
 const ALL_MOVES: f64 = 0.5;
 
-/// Checks that the robot's motion is known.
+/// Checks that the motion of the robot is known.
 pub fn odometry(evidence: &Evidence) -> Option<Finding> {
     let counters = &evidence.inspection.counters;
     let [gaps, jumps] = ["odometry_gap_frames", "odometry_jump_frames"]
@@ -78,8 +78,8 @@ pub fn odometry(evidence: &Evidence) -> Option<Finding> {
     }))
 }
 
-/// Returns the words for odometry with gaps and jumps. Over these the way is not known, so that nothing
-/// is said of a robot that seems to stand.
+/// Returns the words for odometry with gaps and jumps. The distance driven during these is unknown,
+/// so that there is no statement on whether the robot was at rest.
 fn unsteady(gaps: u64, jumps: u64, way: &str, stands: bool) -> String {
     let mut parts = Vec::new();
     if gaps > 0 {

@@ -3,7 +3,7 @@ use tagalong_math::counted;
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
-/// Counters of the reader that are no reason for a missing frame.
+/// Counters of the reader that do not explain a missing frame.
 const NO_REASON: [&str; 10] = [
     "chunks_verified",
     "chunks_without_crc",
@@ -17,7 +17,7 @@ const NO_REASON: [&str; 10] = [
     "odometry_jump_frames",
 ];
 
-/// Checks that the images of the log became frames.
+/// Checks that frames were made from the images of the log.
 pub fn reading(evidence: &Evidence) -> Option<Finding> {
     let made = evidence.reading.made;
     let wanted = evidence.reading.wanted.max(evidence.reading.made);
@@ -51,7 +51,7 @@ pub fn reading(evidence: &Evidence) -> Option<Finding> {
     ))
 }
 
-/// Returns the counters that tell why frames are missing.
+/// Returns the counters that explain missing frames.
 fn reasons(evidence: &Evidence, lost: f64) -> String {
     if lost <= 0.0 {
         return String::new();

@@ -3,7 +3,7 @@ use tagalong_vision::registration::Offset;
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
-/// Columns of the image that the limits on offsets refer to.
+/// Number of columns of the image to which the limits on offsets refer.
 const USUAL_COLUMNS: f64 = 640.0;
 
 /// Greatest error of an offset that is reported, as a fraction of the offset.

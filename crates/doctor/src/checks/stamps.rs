@@ -4,7 +4,7 @@ use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
 impl Evidence {
-    /// Returns the topics of the images and of the laser scans, with their stamps.
+    /// Returns the topics of images and laser scans, with their stamps.
     fn timings(&self) -> impl Iterator<Item = (&str, Timing)> {
         let facts = &self.inspection.facts;
         let topics =
@@ -14,7 +14,7 @@ impl Evidence {
     }
 }
 
-/// Checks for gaps, clocks that jump, and stamps that were never set.
+/// Checks for gaps, jumps of the clock, and stamps that were never set.
 pub fn stamps(evidence: &Evidence) -> Option<Finding> {
     if let Some(topic) =
         evidence.primary().filter(|topic| topic.count > 1 && topic.timing.is_none())
@@ -30,10 +30,10 @@ pub fn stamps(evidence: &Evidence) -> Option<Finding> {
     judged.max_by(|a, b| a.severity.cmp(&b.severity).then(std::cmp::Ordering::Greater))
 }
 
-/// Counter of the reader for a log whose stamps it replaces by the times of recording.
+/// Counter of the reader for logs whose stamps it replaces with recording times.
 const REPLACED: &str = "logs_without_stamps";
 
-/// Returns the finding for a topic without a stamp that is later than the one before.
+/// Returns the finding for a topic in which no stamp is later than the previous one.
 fn unset(topic: &str, used: StampSource, is_replaced: bool) -> Finding {
     let recording = "the times of recording are taken in place of all stamps";
     let (severity, taken) = match used {
@@ -84,7 +84,7 @@ fn judge(topic: &str, timing: &Timing) -> Finding {
     about_stamps(timing, Severity::Ok, measured)
 }
 
-/// A finding on the stamps of a topic, with its figures.
+/// Returns a finding on the stamps of a topic, with its figures.
 fn about_stamps(timing: &Timing, severity: Severity, measured: String) -> Finding {
     Finding::new("stamps", severity, measured)
         .figure("longest_gap_s", timing.longest_gap_s)

@@ -1,7 +1,7 @@
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
-/// Checks that no topic is left out that would give the pipeline an input that it has not.
+/// Checks that no unused topic would give the pipeline an input that it lacks.
 pub fn topics(evidence: &Evidence) -> Option<Finding> {
     let account = &evidence.inspection.inputs;
     let mut curable = account.curable();
