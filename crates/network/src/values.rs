@@ -25,8 +25,7 @@ const COCO_COLUMNS: [usize; 2] = [84, 85];
 /// for it.
 pub(crate) fn fits(family: Family, outputs: &[(&str, &Tensor)], input: InputSize) -> bool {
     let [(_, output)] = outputs else {
-        // If there are several outputs, their names or the shapes for each stride have already
-        // decided.
+        // Several outputs are recognised by their names, or by their shapes for each stride.
         return family != Family::NanoDetM || scores_and_sides(outputs, input).is_some();
     };
     if is_empty(output) {
