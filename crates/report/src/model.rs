@@ -13,8 +13,8 @@ pub struct Benchmark {
     pub version: String,
     /// Results, one per task, in any order.
     pub tasks: Vec<TaskResult>,
-    /// Names of logs that go back to one recording, as copies that `tagalong alter` makes; means and
-    /// intervals count each of them as a log of its own.
+    /// Groups of logs that come from one recording, for example copies made with `tagalong alter`;
+    /// means and intervals count each of them as a separate log.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub copies: Vec<Vec<String>>,
     /// Notes on the logs and their truth, for example that a truth seems to belong to another log.

@@ -92,7 +92,7 @@ fn truth_line(line: &[(f64, f64)]) -> Markup {
     }
 }
 
-/// Returns the end of a track on the picture.
+/// Returns the end of a track in the picture.
 fn last_of(lines: &[Vec<(f64, f64)>]) -> Option<(f64, f64)> {
     lines.last()?.last().copied()
 }
