@@ -507,7 +507,7 @@ fn check_calibration(plan: &Plan, tally: &mut Tally) -> Result<(), LogError> {
     Ok(())
 }
 
-/// Baseline beyond which that of a pair on a robot has another unit, m.
+/// Maximum plausible baseline of a stereo pair on a robot, m; a larger one is in another unit.
 const LARGEST_BASELINE_M: f64 = 5.0;
 
 /// Returns the remedy for a right camera whose calibration has no positive baseline.
@@ -525,7 +525,7 @@ fn baseline_hint(plan: &Plan) -> String {
     )
 }
 
-/// Returns the source of the odometry: its topic, else the tf frames.
+/// Returns the source of the odometry: its topic, or otherwise the tf frames.
 fn odom_frames(chosen: &Chosen) -> Option<Option<(String, String)>> {
     if chosen.odometry.is_some() {
         return Some(None);
@@ -533,11 +533,11 @@ fn odom_frames(chosen: &Chosen) -> Option<Option<(String, String)>> {
     chosen.odom_frames.clone().map(Some)
 }
 
-/// Returns the mount from tf, the settings, or the floor in the first depth images.
+/// Returns the mount from tf, from the settings, or from the floor in the first depth images.
 fn find_mount(plan: &Plan, reread: Reread<'_>) -> Result<Mount, LogError> {
     let camera = plan.scan.frame_of(plan.primary());
     if plan.is_of_points() {
-        // The pose of [input.camera] is that of a camera, whose axes are others.
+        // The pose in [input.camera] is that of a camera, whose axes differ.
         return Mount::of_tf(&plan.scan, camera, &plan.input).ok_or_else(|| {
             let wanted = "pose of the lidar: tf does not connect it with the robot".to_owned();
             missing(&plan.scan, wanted, "; record /tf_static with its mount".to_owned())
@@ -562,13 +562,14 @@ fn find_mount(plan: &Plan, reread: Reread<'_>) -> Result<Mount, LogError> {
     }
 }
 
-/// Maximum ratio between the images.
+/// Number of depth images from which the unit of depth is measured.
 const UNIT_FRAMES: usize = 3;
 /// Largest difference between the images, relative.
 const SAME_FACTOR: f64 = 1.1;
 
-/// Returns the unit of depth by which the floor lies as far below the camera as the mount says, if it
-/// is clearly another one than that which is taken; `None` too where the floor does not tell.
+/// Returns the unit of depth with which the floor is at the distance below the camera that the
+/// mount implies, if it clearly differs from the assumed unit; `None` also if the floor does not
+/// determine it.
 fn measured_unit_m(plan: &Plan, reread: Reread<'_>) -> Result<Option<f64>, LogError> {
     let is_set = plan.input.depth_unit_m.is_some() || plan.input.disparity.is_some();
     let topic = plan.chosen.depth.as_ref().and_then(|topic| plan.scan.topics.get(topic));
@@ -576,7 +577,7 @@ fn measured_unit_m(plan: &Plan, reread: Reread<'_>) -> Result<Option<f64>, LogEr
     if is_set || is_disparity_image(topic) || topic.kind == Type::PointCloud {
         return Ok(None);
     }
-    // Every other source of the pose is measured by depth, or a guess.
+    // Every other source of the pose is measured from depth, or a guess.
     let is_known = match &plan.mount {
         Mount::Tf { .. } => true,
         Mount::Fixed { .. } => plan.input.mount().is_some(),
@@ -603,8 +604,8 @@ fn measured_unit_m(plan: &Plan, reread: Reread<'_>) -> Result<Option<f64>, LogEr
     Ok(Some(written_unit_m(unit_m * factors[factors.len() / 2])))
 }
 
-/// Takes a unit that was measured where nothing else tells it; tells it where the encoding has another
-/// one by convention, which only the user can overrule.
+/// Uses a measured unit if nothing else gives the unit. If the encoding implies another one by
+/// convention, it only reports it, because only the user can overrule that.
 fn take_measured_unit(plan: &mut Plan, unit_m: f64, tally: &mut Tally) {
     let name = plan.chosen.depth.clone().unwrap_or_default();
     let topic = plan.scan.topics.get(&name);
@@ -625,7 +626,7 @@ fn take_measured_unit(plan: &mut Plan, unit_m: f64, tally: &mut Tally) {
     ));
 }
 
-/// Returns a plan that reads depth alone.
+/// Returns a plan that reads only depth.
 fn depth_probe(plan: &Plan, mount: Mount) -> Plan {
     Plan {
         scan: Arc::clone(&plan.scan),
