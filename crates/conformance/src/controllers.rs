@@ -35,8 +35,8 @@ fn bounded(twist: Twist, scene: &str) -> Verdict {
     })
 }
 
-/// Returns a target with its head at a position in the robot frame, m, 1.6 m above the floor, and
-/// with a velocity, m/s.
+/// Returns a target whose head is at a position in the robot frame, m, 1.6 m above the floor, with
+/// a velocity, m/s.
 pub fn target(x: f64, y: f64, velocity: Vector2<f64>) -> Track {
     let mut target = track(1, Point3::new(x, y, 1.6), 0.1, &level());
     target.estimate.person.velocity = velocity;
