@@ -216,9 +216,9 @@ impl ConfigFile {
         Ok(OuterSettings { input, limits, output: pipeline.config().table("output")? })
     }
 
-    /// Returns a note for each list that replaces an inherited one as a whole, because a user who
-    /// wants to change one setting loses all others; and on recorded boxes whose IDs are ignored.
-    /// The config that is written for an installed network replaces its lists on purpose.
+    /// Returns a note for each list that replaces an inherited one as a whole, because changing one
+    /// setting this way loses all others; and on recorded boxes whose IDs are ignored. The config
+    /// that is written for an installed network replaces its lists on purpose.
     pub fn notes(&self) -> Result<Vec<String>, Failure> {
         let installed = installed::config_file(&self.stem());
         if installed.is_some_and(|path| path == self.source.path()) {

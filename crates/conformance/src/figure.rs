@@ -42,7 +42,7 @@ pub struct World {
 }
 
 impl Figure {
-    /// Returns a person of average height who faces the robot, at a position on the floor.
+    /// Returns a person of average height that faces the robot, at a position on the floor.
     pub fn at(x: f64, y: f64) -> Self {
         Self { head: Point3::new(x, y, 1.6), heading_rad: (-y).atan2(-x) }
     }

@@ -118,7 +118,7 @@ fn repeatable(subject: &Subject<'_>) -> Verdict {
     demand(first == second, || format!("two runs differ: {first:?} and {second:?}"))
 }
 
-/// Tracks of two people, one of whom is missed from time to time.
+/// Tracks of two people; one person is missed from time to time.
 #[derive(Debug, PartialEq)]
 struct Watched {
     health: Vec<(bool, f64)>,

@@ -1,5 +1,5 @@
 //! Order of the corners of boxes in a list: x before y, or y before x as in some exports of SSD.
-//! Shapes and ranges are the same in both orders; the proportions of people who stand and walk
+//! Shapes and ranges are the same in both orders; the proportions of standing and walking people
 //! decide.
 
 use crate::ScoredBox;

@@ -13,13 +13,13 @@ pub enum BenchSetting {
     /// A crowd on a circle; each person walks to the opposite point and back.
     #[default]
     Circular,
-    /// People who walk back and forth in a corridor.
+    /// People that walk back and forth in a corridor.
     Corridor,
-    /// People who walk through a crossing of two corridors.
+    /// People that walk through a crossing of two corridors.
     Crossing,
-    /// People who walk through a wide doorway, in the direction of the target.
+    /// People that walk through a wide doorway, in the direction of the target.
     Doorway,
-    /// Obstacles in a room, and people who walk between random points.
+    /// Obstacles in a room, and people that walk between random points.
     Clutter,
 }
 

@@ -10,7 +10,7 @@ use crate::shape::Shape;
 pub struct SightedSolid<'a> {
     /// Index among all solids.
     pub number: u32,
-    /// The person to whom it belongs, if any.
+    /// The person that it belongs to, if any.
     pub person: Option<u16>,
     /// The solid.
     pub shape: &'a Shape,

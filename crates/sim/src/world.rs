@@ -36,7 +36,7 @@ impl Object {
         self
     }
 
-    /// Yields the solids with the person to whom they belong.
+    /// Yields the solids with the person that they belong to.
     fn solids(&self) -> impl Iterator<Item = (Option<u16>, &Shape)> + Clone {
         self.shapes.iter().map(|shape| (self.person, shape))
     }
@@ -130,7 +130,7 @@ impl World {
         Self { stage: Arc::clone(stage), people, shadows: OnceLock::new() }
     }
 
-    /// Yields all solids with the person to whom they belong, if any.
+    /// Yields all solids with the person that they belong to, if any.
     pub(crate) fn solids(&self) -> impl Iterator<Item = (Option<u16>, &Shape)> + Clone {
         self.stage.objects.iter().chain(&self.people).flat_map(Object::solids)
     }

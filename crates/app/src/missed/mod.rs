@@ -35,7 +35,7 @@ const BESIDE: &str = "is seen here, but too far beside the annotated person to c
 /// Time after which the previous track of a person is no longer mentioned, ns.
 const RECENT_NS: i64 = 2_000_000_000;
 
-/// Returns true for a test that gives information about the person at whom it dropped a candidate.
+/// Returns true for a test that gives information about the person where it dropped a candidate.
 pub fn is_telling(test: &str) -> bool {
     test != NOT_BEST
 }
