@@ -1,5 +1,6 @@
-//! KITTI tracking labels: one object per line, fields separated by blanks, frames from 0,
-//! `frame id type truncated occluded alpha left top right bottom height width length x y z rotation_y [score]`.
+//! KITTI tracking labels: one object per line, fields separated by blanks, frames from 0, `frame id
+//! type truncated occluded alpha left top right bottom height width length x y z rotation_y
+//! [score]`.
 
 use std::io::{self, Write};
 
