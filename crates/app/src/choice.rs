@@ -203,7 +203,7 @@ impl Fittings {
             return None;
         }
         let topic = self.account.curable().find(|topic| {
-            // Only these two inputs can make a better pipeline fit.
+            // The best pipeline needs just these two inputs.
             matches!(topic.could_be, Some("depth" | "colour"))
         });
         let Some(topic) = topic else { return self.refused_though_there() };

@@ -105,7 +105,7 @@ pub struct Forecast {
 }
 
 impl Forecast {
-    /// Begins, and reports the number of tasks.
+    /// Starts a forecast, and reports the number of tasks.
     pub fn new(total: usize, kind: &'static str) -> Self {
         if total > 1 {
             say(&format!("{total} {kind}"));

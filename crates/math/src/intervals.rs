@@ -70,8 +70,8 @@ fn open_above<'de, D: Deserializer<'de>>(end: D) -> Result<f64, D::Error> {
     Ok(Option::deserialize(end)?.unwrap_or(f64::INFINITY))
 }
 
-/// The Wilson score interval of a success rate (Wilson, JASA 1927), which also holds for few trials
-/// and for rates of 0 and 1. `None` without trials. The trials have to be independent;
+/// Returns the Wilson score interval of a success rate (Wilson, JASA 1927), which also holds for
+/// few trials and for rates of 0 and 1. `None` without trials. The trials have to be independent;
 /// [`clustered_share`] is for those that are not.
 ///
 /// `confidence` lies between 0 and 1, exclusive, for example 0.95.

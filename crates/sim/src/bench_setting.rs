@@ -39,7 +39,7 @@ settings! {
         /// Number of obstacles of the clutter.
         #[schemars(range(max = 40))]
         pub obstacles: usize = 20,
-        /// Way of walking of all people.
+        /// Walking model of all people.
         pub walk: Walk = Walk::Orca,
     }
 }

@@ -137,7 +137,8 @@ impl Material {
         [tint(0), tint(1), tint(2)]
     }
 
-    /// Small objects have so few pixels that vector instructions would not gain anything.
+    /// Computes the colours one by one. Small objects have so few pixels that vector instructions
+    /// would not gain anything.
     fn colours_one_by_one(&self, own: &Vectors, wanted: &[bool; LANES]) -> [Lanes; 3] {
         let mut colours = [[0.0; LANES]; 3];
         for lane in (0..LANES).filter(|lane| wanted[*lane]) {
@@ -309,7 +310,7 @@ fn value_noise(x: f64, y: f64, z: f64) -> f64 {
     between(layer(x, y, below), layer(x, y, above), smooth(part(z)))
 }
 
-/// As [`value_noise`] in the plane `z = 0`, where the layer above has no weight.
+/// Returns [`value_noise`] in the plane `z = 0`, where the layer above has no weight.
 #[inline(always)]
 fn flat_noise(x: f64, y: f64) -> f64 {
     layer(x, y, 0)

@@ -307,7 +307,7 @@ settings! {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Trick {
-    /// Nothing special.
+    /// No special behaviour.
     #[default]
     None,
     /// Turns round and goes back.
@@ -340,7 +340,7 @@ settings! {
         /// away from furniture and the robot's start.
         #[schemars(range(max = 1000))]
         pub wander: usize = 0,
-        /// Way of walking.
+        /// Walking model.
         #[serde(skip_serializing_if = "Walk::is_plain")]
         pub walk: Walk = Walk::Plain,
         /// Preferred speed, m/s.

@@ -211,7 +211,7 @@ fn enter_ball(start: &Vector3<f64>, step: &Vector3<f64>, tangent2: f64) -> f64 {
     if root >= 0.0 { t } else { f64::INFINITY }
 }
 
-/// Slab method: Kay & Kajiya 1986.
+/// Intersects a ray with a block by the slab method (Kay & Kajiya 1986).
 #[inline(always)]
 fn enter_block(start: &Vector3<f64>, step: &Vector3<f64>) -> f64 {
     #[inline(always)]

@@ -17,7 +17,7 @@ const COLOURS: usize = 2 * HUES + GREYS;
 const EDGES: usize = 9;
 /// Number of sampled pixels of a patch along each axis.
 const SAMPLES: usize = 24;
-/// Least number of pixels in a histogram.
+/// Minimum number of pixels in a histogram.
 const LEAST_PIXELS: usize = 24;
 /// Depth difference from which on a pixel does not belong to the person, m.
 const BODY_DEPTH_M: f64 = 0.35;

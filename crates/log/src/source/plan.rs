@@ -564,7 +564,7 @@ fn find_mount(plan: &Plan, reread: Reread<'_>) -> Result<Mount, LogError> {
 
 /// Number of depth images from which the unit of depth is measured.
 const UNIT_FRAMES: usize = 3;
-/// Largest difference between the images, relative.
+/// Maximum ratio between the factors from different images.
 const SAME_FACTOR: f64 = 1.1;
 
 /// Returns the unit of depth with which the floor is at the distance below the camera that the
