@@ -82,7 +82,7 @@ pub struct BoxesArgs {
     /// Seed of the sample.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// Runs at once; the results are the same [default: as many as there are cores].
+    /// Number of runs in parallel; it does not affect the results [default: the number of cores].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     pub jobs: Option<u8>,
     /// Writes the tracks to CONFIG/SEQUENCE.txt in this folder; those with the settings

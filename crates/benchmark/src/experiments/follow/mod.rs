@@ -83,8 +83,7 @@ pub struct FollowArgs {
     /// `camera.height_m=0.3,0.5`.
     #[arg(long, value_name = "KEY=VALUES", value_parser = tagalong_simulate::key_and_value)]
     pub sweep: Option<(String, String)>,
-    /// Rides at once; the results are the same [default: as many as there are
-    /// cores].
+    /// Number of rides in parallel; it does not affect the results [default: the number of cores].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     pub jobs: Option<u8>,
     /// Write the log of every ride (images, truth, commands, reasons), its folder for `view`, and

@@ -54,8 +54,7 @@ pub struct TrialsArgs {
     /// The first of these seeds, counted within the split: another one gives other random variants.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub first_seed: u64,
-    /// Trials that run at once; the results are the same [default: as many as
-    /// there are cores].
+    /// Number of trials in parallel; it does not affect the results [default: the number of cores].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     pub jobs: Option<u8>,
     /// Output format.
