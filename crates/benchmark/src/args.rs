@@ -102,7 +102,7 @@ pub struct PlanArgs {
 /// Execution of the tasks.
 #[derive(Args, Clone, Debug)]
 pub struct RunArgs {
-    /// Tasks that run at once; the results are the same.
+    /// Number of tasks that run in parallel; it does not affect the results.
     #[arg(long, value_name = "N", default_value_t = 1,
           value_parser = clap::value_parser!(u16).range(1..=256))]
     pub jobs: u16,
