@@ -1,5 +1,5 @@
-//! Files that a user names, read within a limit: a device has no end, a pipe waits for ever, and a
-//! sparse file of gigabytes takes as much memory.
+//! Files that a user names, read within a limit, because a device has no end, a pipe waits for
+//! ever, and a sparse file of gigabytes takes as much memory.
 
 use std::fs::{self, File};
 use std::io::{Error, ErrorKind, Read as _, Result};

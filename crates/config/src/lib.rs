@@ -1,21 +1,21 @@
 //! Settings and their ranges, and the registry of plugins that a config names.
 //!
-//! * [`Settings`]: a struct with documented fields, defaults and ranges. [`parse_settings`]
-//!   reads it from TOML and refuses unknown keys and numbers out of range, with their place.
-//! * [`Registry`]: the plugins of a program. A plugin crate has a `register` function that the
+//! * [`Settings`]: a struct with documented fields, defaults and ranges. [`parse_settings`] reads
+//!   it from TOML and refuses unknown keys and numbers out of range, with their place in the text.
+//! * [`Registry`]: the plugins of a program. A plugin crate has a `register` function, which the
 //!   program calls.
 //! * [`read_text`], [`read_bytes`]: files that a user names, within a limit.
-//! * [`check_xml`]: XML files that keep a parser busy are refused.
-//! * [`path_text`]: paths in JSON, of any bytes.
+//! * [`check_xml`]: refuses XML files that would keep a parser busy.
+//! * [`path_text`]: paths in JSON, whatever their bytes.
 //! * [`OrAuto`]: a setting that is one of several words, or `auto`.
-//! * [`ConfigError`]: a mistake with its place in the text.
+//! * [`ConfigError`]: an error with its place in the text.
 //!
-//! # Crates of others in public signatures
+//! # External crates in public signatures
 //!
 //! Settings implement traits of `serde` and `schemars`, and values of a config are those of `toml`.
 //! The versions that Tagalong uses are re-exported as [`serde`], [`schemars`] and [`toml`]; another
-//! major version of one of them is a breaking change of this crate. A plugin that takes them from
-//! here needs no dependencies of its own, and never has a version that does not fit:
+//! major version of one of them is a breaking change of this crate. A plugin that uses these
+//! re-exports needs no dependencies of its own, and its versions always match:
 //!
 //! ```
 //! use tagalong_config::schemars::JsonSchema;

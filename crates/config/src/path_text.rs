@@ -1,8 +1,8 @@
-//! Paths in JSON. A path is any bytes on most systems, and JSON is text: serde refuses a path that
-//! is not UTF-8.
+//! Paths in JSON. On most systems a path may have any bytes, but JSON is text: serde refuses a path
+//! that is not UTF-8.
 //!
 //! Such a path becomes `{"escaped": "/data/n\\xff.mcap"}`, in which `\xff` is a byte and `\\` a
-//! backslash; every other path is a plain text. Both are read back as the same path.
+//! backslash; every other path is plain text. Both forms are read back as the same path.
 
 use std::ffi::OsString;
 use std::fmt::Write as _;

@@ -1,6 +1,6 @@
-//! Limits of XML files that a user names. The parser compares each attribute of an element with all
-//! before it, and each namespace with all around it: a file of a megabyte could keep it busy for
-//! hours.
+//! Limits on XML files that a user names. The parser compares each attribute of an element with all
+//! attributes before it, and each namespace with all those around it: a file of one megabyte could
+//! keep it busy for hours.
 
 /// Most attributes of an element.
 const MOST_ATTRIBUTES: usize = 1000;

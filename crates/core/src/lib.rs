@@ -1,12 +1,12 @@
 //! Common types of Tagalong and the traits of its six kinds of plugin.
 //!
-//! All types that two crates of the workspace exchange are defined here and nowhere else: a
-//! [`Detector`] finds people in a [`Frame`] as [`Detection`]s, a [`Verifier`] judges them, an
-//! [`Associator`] assigns them to [`Track`]s, a [`Filter`] (or a [`PersonFilter`], for one person
-//! at a time) estimates their states, a
-//! [`TrackManager`] starts and ends them, and a [`Controller`] steers after one of them.
+//! All types that two crates of the workspace exchange are defined here: a [`Detector`] finds
+//! people in a [`Frame`] as [`Detection`]s, a [`Verifier`] judges them, an [`Associator`] assigns
+//! them to [`Track`]s, a [`Filter`] (or a [`PersonFilter`], for one person at a time) estimates
+//! their states, a [`TrackManager`] starts and ends them, and a [`Controller`] steers after one of
+//! them.
 //!
-//! # Why a detection has a position, and a box if a camera made it
+//! # Position and box of a detection
 //!
 //! A detection is a position in the robot frame, with a box in the image if a camera made it.
 //! Stereo, RGB-D and panorama cameras and laser scanners therefore share one interface, and a
@@ -22,8 +22,8 @@
 //!   the Euclidean range.
 //! * The position of a person is the **centre of the head** (`HEAD_RADIUS_M` behind the surface
 //!   that a depth camera measures).
-//! * No clocks and no global randomness in plugins: time comes from the frame, seeds from
-//!   `Context`. Same log, same config, same seed: same bytes.
+//! * Plugins use no clocks and no global randomness: time comes from the frame, seeds from
+//!   `Context`. The same log, config and seed give the same bytes.
 
 mod associator;
 mod control;

@@ -1,11 +1,11 @@
 //! Enable switch of a robot: a deadman's switch with a latch.
 //!
-//! Values in, values out: events with their times go in, and the permission to move at a time comes
-//! out. Times are measured from any fixed moment by a clock that only goes forward.
+//! The switch has no clock of its own: it takes events with their times, and says whether the robot
+//! may move at a given time. Times are measured from any fixed moment by a monotonic clock.
 //!
-//! A *press* is an `On` after a release: after an `Off`, or after no `On` for longer than the heartbeat
-//! lasts. A reset spends the press that is held at that moment, so that a button that is stuck, or a
-//! program that repeats `On` for ever, does not move the robot after it.
+//! A *press* is an `On` after a release: after an `Off`, or after more time without an `On` than
+//! the heartbeat lasts. A reset uses up the press that is held at that moment, so that a stuck
+//! button, or a program that repeats `On` for ever, does not move the robot after the reset.
 //!
 //! ```text
 //!            Reset                 press                  On, in time

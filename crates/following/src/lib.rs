@@ -5,21 +5,21 @@
 //! | stage | module | settings |
 //! |---|---|---|
 //! | choice of the target, and its recovery after a loss | `target_lock` | [`TargetSettings`] |
-//! | wish of the controller, or of the search for a lost target | the controller, `target_lock` | [`SearchSettings`] |
+//! | command of the controller, or of the search for a lost target | the controller, `target_lock` | [`SearchSettings`] |
 //! | obstacles around the robot | `command_limiter` | [`CollisionMonitorSettings`] |
 //! | limits of the command | `command_limiter` | [`CommandLimiterSettings`] |
 //!
-//! A program calls following as a skill: [`Steering::enroll`] with an [`Enrollment`],
+//! Following is also a skill that a program calls: [`Steering::enroll`] with an [`Enrollment`],
 //! [`Steering::status`], [`Steering::clear`].
 //!
 //! # Invariants
 //!
-//! * A fault, a pause of the frames and a number that is not finite end in a stop.
-//! * A command is valid for a limited time; [`Orders`] answers with zero after that.
-//! * Without sensors of obstacles nothing moves, unless the settings say so in words.
-//! * [`EnableSwitch`] decides whether a robot may move at all; a bridge to a robot asks it for each
-//!   command.
-//! * This is no safety function in the sense of the standards.
+//! * A fault, a gap between frames, or a number that is not finite stops the robot.
+//! * A command is valid for a limited time; after that [`Orders`] returns zero.
+//! * Without obstacle sensors the robot does not move, unless the settings say so explicitly.
+//! * [`EnableSwitch`] decides whether a robot may move at all; a bridge to a robot checks it for
+//!   each command.
+//! * This is not a safety function in the sense of the standards.
 
 mod cause;
 mod collision_monitor;

@@ -18,16 +18,16 @@ pub enum Base {
     Differential,
     /// Speed and turn rate are independent.
     Holonomic,
-    /// Steered wheels: the turn rate is at most the speed by the least radius.
+    /// Steered wheels: the turn rate is at most the speed divided by the minimum turning radius.
     Ackermann,
 }
 
-/// Source of the robot's motion that a controller has.
+/// Odometry that a controller requires.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum OdometrySource {
-    /// Without odometry nothing moves.
+    /// The robot does not move without odometry.
     #[default]
     Required,
     /// The robot moves without odometry.
@@ -35,7 +35,7 @@ pub enum OdometrySource {
 }
 
 settings! {
-    /// Drive of the robot.
+    /// Base of the robot: its drive, its outline and its odometry.
     pub struct RobotSettings {
         /// Half the distance between the driven wheels, m.
         #[schemars(range(min = 0.05, max = 1.0))]
@@ -43,19 +43,19 @@ settings! {
         /// Standard deviation of a wheel's travel, as a fraction of it.
         #[schemars(range(min = 0.0, max = 1.0))]
         pub wheel_slip: f64 = 0.02,
-        /// Speed limit of a wheel, m/s; of the middle of a base that is holonomic.
+        /// Speed limit of a wheel, m/s; of the centre of the base if it is holonomic.
         #[schemars(range(min = 0.05, max = 0.9))]
         pub max_speed_mps: f64 = 0.9,
-        /// Kind of the base: "differential"; "holonomic", which drives and turns independently (it
-        /// is not driven sideways); or "ackermann", which steers like a car and does not turn on
-        /// the spot.
+        /// Kind of the base: "differential"; "holonomic", whose speed and turn rate are independent
+        /// (it is not driven sideways); or "ackermann", which steers like a car and does not turn
+        /// in place.
         pub base: Base = Base::Differential,
-        /// Least radius of the turn of an "ackermann" base, at the middle of its driven axle, m.
+        /// Minimum turning radius of an "ackermann" base, at the middle of its driven axle, m.
         #[schemars(range(min = 0.1, max = 20.0))]
         pub min_turn_radius_m: f64 = 0.5,
-        /// Outline of the robot on the floor: corners in order around it, x forward and y left of
-        /// the point between its wheels, m (Nav2's `footprint`). With all that stands out, and what
-        /// it carries.
+        /// Outline of the robot on the floor (Nav2's `footprint`): corners in order around it, x
+        /// forward and y left of the point midway between its wheels, m. Include protruding parts
+        /// and the payload.
         // An octagon around a disc of a radius of 0.25 m, somewhat more than the robot of P1.
         pub footprint: Vec<[f64; 2]> = vec![
             [0.25, 0.1],
@@ -67,11 +67,11 @@ settings! {
             [-0.1, 0.25],
             [0.1, 0.25],
         ],
-        /// Height of the robot with all that it carries, m.
+        /// Height of the robot including its payload, m.
         #[schemars(range(min = 0.05, max = 3.0))]
         pub height_m: f64 = 1.4,
-        /// Source of the robot's motion: "required", or "none" for a controller that is to drive
-        /// without odometry, as if the robot were always at rest.
+        /// Odometry: "required", or "none" for a controller that may drive without odometry, as if
+        /// the robot were always at rest.
         pub odometry: OdometrySource = OdometrySource::Required,
     }
 }

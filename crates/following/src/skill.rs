@@ -1,4 +1,4 @@
-//! Following as a skill that a program calls: enroll a person, ask for the status, clear.
+//! Following as a skill that a program calls: enroll a person, query the status, clear the target.
 
 use std::fmt;
 

@@ -10,17 +10,16 @@ use tagalong_geometry::Rect;
 use tagalong_network::{Convention, EmbeddingNetwork, LimitSettings, model_file, with_colours};
 use tagalong_vision::{Describer, Embedder};
 
-/// Description of people by a re-identification network, for `[reidentification]`, its
-/// `association_weight` and the target lock. Differences are 1 minus the cosine of two vectors.
+/// Embeddings of people from a re-identification network, for `[reidentification]`, its
+/// `association_weight` and the target lock. Differences are 1 minus the cosine of two embeddings.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 #[non_exhaustive]
 pub struct AppearanceSettings {
-    /// ONNX file of a re-identification network, relative to the config, or the name of an installed
-    /// one. Empty: people are
-    /// described by colours and edges.
+    /// ONNX file of a re-identification network, relative to the config, or the name of an
+    /// installed one. Empty: colours and edges describe people.
     pub model: String,
-    /// Convention of its input: `auto` (by the outputs), `osnet` (RGB, mean and deviation of
+    /// Convention of the input: `auto` (by the outputs), `osnet` (RGB, mean and deviation of
     /// ImageNet) or `omz` (BGR, 0 to 255).
     pub convention: OrAuto<Convention>,
     /// Limits of the network; a person without a result has no appearance in that frame.

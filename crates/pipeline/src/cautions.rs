@@ -1,4 +1,4 @@
-//! Warnings of settings that are valid and work badly.
+//! Warnings about settings that are valid but work badly.
 
 use nalgebra::Point2;
 use tagalong_core::Input;

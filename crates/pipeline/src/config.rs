@@ -1,5 +1,5 @@
-//! Building a pipeline from TOML. The text is parsed once into values that keep their spans; each
-//! plugin receives its own, so that every mistake is shown with its line.
+//! Building a pipeline from TOML. The text is parsed once into values that keep their spans, and
+//! each plugin receives its own values, so that every error is shown with its line.
 
 use std::ops::Range;
 use std::path::Path;

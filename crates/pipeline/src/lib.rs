@@ -4,8 +4,8 @@
 //! frame through them and returns a [`FrameReport`] with the tracks and, for every rejected
 //! candidate, the test that dropped it.
 //!
-//! With plugins of the caller and those that it registers; the feature `plugins` registers all of
-//! Tagalong's:
+//! A pipeline with a detector of the caller; the registry holds the plugins that the caller
+//! registers, and the feature `plugins` registers all of Tagalong's:
 //!
 //! ```
 //! use tagalong_config::{NoSettings, Registry};
@@ -59,7 +59,7 @@
 //!
 //! * Those of the tracker: see `tagalong_tracking`.
 //! * No number that is not finite leaves [`Pipeline::step`].
-//! * Timings are in [`FrameReport::timings`] and influence nothing.
+//! * Timings are in [`FrameReport::timings`] and influence no result.
 //!
 //! # The pipeline's own entries in the funnel
 //!
@@ -67,24 +67,24 @@
 //! |---|---|
 //! | `frame: duplicate`, `frame: out of order` | a frame, by its stamp |
 //! | `frame: calibration changed` | a frame of another calibration, and each after it; tracks stay where they were |
-//! | `odometry: ...` | a frame that shows too little to correct the wheels by |
+//! | `odometry: ...` | a frame that shows too little to correct the wheel odometry |
 //! | `stereo: ...`, `stereo pixels: ...` | a stereo pair, or pixels of it, without depth |
-//! | `motion not finite` | a frame's odometry; the robot counts as standing |
-//! | `detection not finite`, `verifier not finite` | a candidate with numbers that cannot be |
+//! | `motion not finite` | a frame's odometry; the robot counts as at rest |
+//! | `detection not finite`, `verifier not finite` | a candidate with numbers that are not finite |
 //! | `gate`, `not the best detection` | a detection found near a track |
 //! | `same person` | the weaker of two detections of one person |
 //! | `association not possible`, `associator` | an impossible pair; a detection already used up |
 //! | `rather a new person` | a pair with a track that was lost; the detection may start a track |
-//! | `tracked already` | a detection at the place of a track that is seen there, or predicted there for sure |
-//! | `score`, `verifier` | a candidate that its detector or the verifiers call no person |
+//! | `tracked already` | a detection at a track that is seen or certain to be there |
+//! | `score`, `verifier` | a candidate that its detector or the verifiers reject as no person |
 //! | `doubt`, `clutter`, `no track fits` | a candidate that the track manager refuses |
 //! | `filter` | a match that the filter did not accept |
-//! | `too many detections`, `no track numbers left` | an excess over a limit |
-//! | `support of an unknown track`, `estimate of an unknown track` | a filter's unknown track |
-//! | `nis not finite` | a filter's invalid innovation |
-//! | `appearance: no vector` | a person that the network of `[appearance]` did not describe in time |
+//! | `too many detections`, `no track numbers left` | what exceeds a limit |
+//! | `support of an unknown track`, `estimate of an unknown track` | an unknown track of a filter |
+//! | `nis not finite` | an innovation of a filter that is not finite |
+//! | `appearance: no vector` | a person without an embedding of `[appearance]` in time |
 //! | `command not finite` | a controller's command; the robot stops |
-//! | `track: ...` | a track, by the reason for which it ended |
+//! | `track: ...` | a track, with the reason for its end |
 
 mod appearance;
 mod builder;

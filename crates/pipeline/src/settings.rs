@@ -14,35 +14,35 @@ use tagalong_tracking::{
     SilhouetteSettings, TrackerSettings,
 };
 
-/// Keys of the pipeline itself. Beside them a config has the plugin sections `[[detectors]]`,
+/// Keys of the pipeline itself. A config also has the plugin sections `[[detectors]]`,
 /// `[[verifiers]]`, `[associator]`, `[filter]`, `[manager]` and `[controller]`, each with the name
 /// of a `plugin` and its settings in the sub-table `config`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 #[non_exhaustive]
 pub struct PipelineSettings {
-    /// Seed of everything random. The same log, config and seed give the same bytes.
+    /// Seed of all random numbers. The same log, config and seed give the same bytes.
     pub seed: u64,
     /// Inputs that the pipeline ignores, even where the log has them: `colour`, `depth`, `right`,
     /// `laser`, `detections`.
     pub without: Vec<Input>,
     /// The robot.
     pub robot: RobotSettings,
-    /// Depth from a stereo pair, for frames that have none. Left out: the log carries depth, or no
-    /// plugin needs it.
+    /// Depth from a stereo pair, for frames that have none. If left out, the log must carry depth,
+    /// or no plugin may need it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stereo: Option<StereoSettings>,
-    /// Odometry that is corrected by static structure in the images, or comes from them alone. Left
-    /// out: the odometry of the log is used as it is.
+    /// Odometry corrected by static structure in the images, or from the images alone. If left out,
+    /// the odometry of the log is used unchanged.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub odometry: Option<OdometrySettings>,
-    /// Treatment of stamps that jump.
+    /// Handling of stamps that jump.
     pub clock: ClockSettings,
-    /// Tests for several detections, or several tracks, of one person.
+    /// Merging of detections, and of tracks, of one person.
     pub merge: MergeSettings,
-    /// Test for people hidden behind others.
+    /// Occlusion of people by nearer ones.
     pub occlusion: OcclusionSettings,
-    /// New people near a track that was lost.
+    /// New people near lost tracks.
     pub births: BirthSettings,
     /// Network that describes people by their appearance.
     pub appearance: AppearanceSettings,
@@ -52,9 +52,9 @@ pub struct PipelineSettings {
     pub silhouette: SilhouetteSettings,
     /// Choice and confirmation of the person to follow.
     pub target: TargetSettings,
-    /// Limits on the robot's motion, for any wish of the controller.
+    /// Limits on the robot's motion, whatever the controller requests.
     pub command_limiter: CommandLimiterSettings,
-    /// Obstacles ahead that stop the robot.
+    /// Obstacles and people for which the robot slows down and stops.
     pub collision_monitor: CollisionMonitorSettings,
 }
 
@@ -73,8 +73,8 @@ impl PipelineSettings {
     }
 }
 
-/// A `[[verifiers]]`, `[associator]`, `[filter]`, `[manager]` or `[controller]` section without its
-/// `config`.
+/// Keys of a `[[verifiers]]`, `[associator]`, `[filter]`, `[manager]` or `[controller]` section
+/// other than its `config`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 #[non_exhaustive]

@@ -29,59 +29,59 @@ pub enum FaultKind {
     FreezeAll,
     /// The scan of the laser scanner is repeated with new stamps.
     FreezeLaser,
-    /// The depth image has no readings.
+    /// The depth image has no reading at all.
     BlankDepth,
-    /// Each pixel of the depth image has the maximum value, 65.535 m.
+    /// Each pixel of the depth image has the largest value, 65.535 m.
     SaturateDepth,
     /// Only `share` of the columns of the depth image have readings.
     DarkColumns,
     /// Noise with the standard deviation `size`, m, is added to the depth image.
     NoiseDepth,
-    /// Rays of the laser scanner in front are NaN, 0 or infinite: `share` of the circle.
+    /// Rays of the laser scanner ahead are NaN, 0 or infinite: `share` of the circle.
     LaserInvalid,
-    /// Rays of the laser scanner in front are below its minimum range: `share` of the circle.
+    /// Rays of the laser scanner ahead are below its minimum range: `share` of the circle.
     LaserNear,
     /// Images arrive `size` seconds late.
     Delay,
-    /// The last image arrives repeatedly with its old stamp.
+    /// The last image arrives again and again with its old stamp.
     Resend,
-    /// No images arrive.
+    /// No image arrives.
     Drop,
-    /// The laser scanner delivers no scans.
+    /// The laser scanner delivers no scan.
     DropLaser,
     /// The further obstacle sensors (`lasers`, `ranges`, `bumpers`) repeat their readings.
     FreezeSensors,
     /// The further obstacle sensors are silent.
     DropSensors,
-    /// The poses of the odometry are NaN.
+    /// The poses of the odometry are not finite.
     NanOdometry,
     /// The odometry is silent.
     OdometrySilent,
-    /// The values of the odometry are frozen, with new stamps.
+    /// The values of the odometry do not change, but its stamps do.
     OdometryFrozen,
     /// The odometry measures `size` times the motion.
     OdometryWrong,
     /// The stamps of the odometry are `size` seconds ahead.
     OdometryLateStamps,
-    /// The camera is recalibrated: its new calibration has `size` times the focal length.
+    /// The calibration of the camera changes to `size` times the focal length.
     CalibrationChanged,
-    /// The camera turns `size` degrees to the left, and the static transforms are updated.
+    /// The camera turns `size` degrees to the left, and the static transforms change with it.
     MountMoved,
-    /// The camera turns `size` degrees to the left, and the static transforms are not updated.
+    /// The camera turns `size` degrees to the left, and the static transforms stay the same.
     MountKnocked,
-    /// The wheels do not move, whatever is commanded.
+    /// The wheels do not turn, whatever is commanded.
     WheelsStuck,
     /// The wheels turn as commanded, but `share` of their travel is lost on the ground.
     WheelsSlip,
-    /// The base continues with its last command.
+    /// The base keeps executing its last command.
     WheelsRunaway,
     /// Commands reach the wheels `size` seconds late.
     WheelLatency,
-    /// The clock of the robot goes back by `size` seconds.
+    /// The clock of the robot is set back by `size` seconds.
     ClockBack,
-    /// The clock of the robot goes forward by `size` seconds.
+    /// The clock of the robot is set forward by `size` seconds.
     ClockForward,
-    /// The robot is switched off and reset, and the enable button is stuck meanwhile.
+    /// The robot is switched off and reset while the enable button is stuck.
     EnableStuck,
 }
 

@@ -1,9 +1,9 @@
-//! New people near a track that was lost: a pair is kept only if the detection is rather of the
-//! track's person than of a newcomer.
+//! New people near a lost track: an association is kept only if the detection is more likely to be
+//! of the track's person than of a newcomer.
 //!
-//! The uncertainty of a track that is not seen grows until its gate takes in half a room, and the
-//! next person to enter would inherit its number. New people are rare in the middle of the
-//! image, and less so at its borders.
+//! The uncertainty of a track without detections grows until its gate covers half a room, and the
+//! next person to enter would inherit its ID. New people are rare in the middle of the image, and
+//! less rare at its borders.
 
 use std::f64::consts::TAU;
 

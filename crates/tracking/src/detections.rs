@@ -1,4 +1,4 @@
-//! Detections of one frame, with the decisions of the tracker about them.
+//! Detections of one frame, with the decisions that the tracker makes about them.
 
 use nalgebra::Point2;
 use tagalong_core::{Associations, Detection, Funnel, Matched, Track, TrackId};

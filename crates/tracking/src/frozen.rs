@@ -1,4 +1,4 @@
-//! Tracks that stay where they are: after a fault that makes every further position wrong.
+//! Tracks that keep their positions after a fault that makes every further position wrong.
 
 use nalgebra::{Matrix2, SMatrix};
 use tagalong_core::{EgoMotion, Estimate, Person, Track};

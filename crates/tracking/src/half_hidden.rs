@@ -1,6 +1,6 @@
-//! Detections of half-hidden people: a detection covers the visible half, and its middle is off by
+//! Detections of half-hidden people: a detection covers the visible half, so its centre is off by
 //! up to half the width of the hidden part. Without a larger covariance a filter takes on the
-//! velocity of the person that passes in front.
+//! velocity of the person in front.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use tagalong_core::{Detection, Estimate, Frame, Track};

@@ -1,18 +1,18 @@
 //! Tracker: [`Tracker::step`] takes one frame through all stages, in the order of the table below,
-//! and returns a [`TrackingReport`] with the tracks and, for every candidate that led to none, the
-//! test that dropped it.
+//! and returns a [`TrackingReport`] with the tracks and, for every candidate that led to no track,
+//! the test that dropped it.
 //!
 //! | stage | module | decided by |
 //! |---|---|---|
 //! | frames without a required input refused | `needs` | the plugins |
 //! | stamps that jump | `clock` | [`ClockSettings`] |
-//! | tracks held, once the calibration changed | `frozen` | |
+//! | tracks frozen once the calibration has changed | `frozen` | |
 //! | depth and motion completed | `preprocess` | each [`Preprocessor`] |
 //! | tracks predicted | | the filter |
 //! | tracks searched for, image searched for new people | `search` | detectors, verifiers |
 //! | detections of one person merged | `detections` | [`MergeSettings`] |
 //! | detections associated with tracks | | the associator |
-//! | detections of new people taken from lost tracks | `births` | [`BirthSettings`] |
+//! | detections of new people separated from lost tracks | `births` | [`BirthSettings`] |
 //! | detections of half-hidden people made less certain | `occlusion` | [`OcclusionSettings`] |
 //! | filter updated | | the filter |
 //! | tracks started, confirmed, ended | `table` | the track manager |
@@ -23,7 +23,7 @@
 //! The tracker itself decides nothing about people: it calls the plugins in this order, checks
 //! their results, and counts the candidates that they drop.
 //!
-//! A tracker without a config, of a detector of the caller and three plugins:
+//! A tracker without a config, with a detector of the caller and three plugins:
 //!
 //! ```
 //! use tagalong_core::*;
@@ -93,13 +93,13 @@
 //! # Invariants
 //!
 //! * Time never runs backwards for a plugin.
-//! * The number of a track is never used twice, not even after a reset. A report gives a person who
-//!   was recognised the earlier number ([`ReidentificationSettings`]).
+//! * The ID of a track is never used twice, not even after a reset. A report gives a recognised
+//!   person the earlier ID ([`ReidentificationSettings`]).
 //! * Nothing is dropped silently: each loss is counted in the funnel.
 //! * No number that is not finite leaves the tracker.
-//! * Coasting is no separate mode: a predicted occlusion, a wrong rejection by a verifier and a
-//!   miss of a detector look the same to the filter, namely as no evidence.
-//! * Timings influence nothing.
+//! * Coasting is not a separate mode: a predicted occlusion, a wrong rejection by a verifier and a
+//!   miss of a detector are the same to the filter, namely no evidence.
+//! * Timings influence no result.
 
 mod births;
 mod clock;

@@ -1,5 +1,5 @@
 //! Occlusion of people by nearer ones (P4, section III-C): silhouettes are rendered at the
-//! predicted positions, from near to far.
+//! predicted positions, nearest first.
 
 use std::sync::LazyLock;
 

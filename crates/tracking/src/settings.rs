@@ -8,17 +8,16 @@ settings! {
     /// Handling of stamps that jump.
     #[non_exhaustive]
     pub struct ClockSettings {
-        /// A frame that is older than the previous one by at most this many seconds came out of
-        /// order and is dropped. If it is older by more, the clock was set back, and all tracks
-        /// end.
+        /// Largest amount by which the stamp of a frame may be older than the previous one, s: such
+        /// a frame is out of order and is dropped. If it is older by more, the clock was set back,
+        /// and all tracks end.
         #[schemars(range(min = 0.0))]
         pub max_back_s: f64 = 0.1,
-        /// A pause longer than this, in seconds, and than three usual frame periods, is a gap:
-        /// tentative tracks end.
+        /// Pause after which tentative tracks end, s; it must also exceed three usual frame
+        /// periods.
         #[schemars(extend("exclusiveMinimum" = 0))]
         pub max_gap_s: f64 = 0.5,
-        /// After a pause longer than this, in seconds, and than three usual frame periods, all
-        /// tracks end.
+        /// Pause after which all tracks end, s; it must also exceed three usual frame periods.
         pub reset_gap_s: f64 = 0.9,
     }
 }
@@ -27,23 +26,23 @@ settings! {
     /// Merging of detections, and of tracks, of one person.
     #[non_exhaustive]
     pub struct MergeSettings {
-        /// Two detections nearer to each other on the floor than this belong to one person, m; the
-        /// one with the higher score is kept.
+        /// Distance on the floor below which two detections belong to one person, m; the one with
+        /// the higher score is kept.
         #[schemars(range(min = 0.0))]
         pub same_person_m: f64 = 0.25,
-        /// Two detections that overlap by more than this belong to one person, unless their
-        /// positions contradict it.
+        /// Overlap (IoU) above which two detections belong to one person, unless their positions
+        /// contradict it.
         #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 1))]
         pub same_person_iou: f64 = 0.5,
-        /// Most detections in a frame; the ones with the lowest scores are dropped.
+        /// Largest number of detections in a frame; the ones with the lowest scores are dropped.
         #[schemars(range(min = 1))]
         pub max_detections: usize = 1024,
-        /// Two tracks nearer to each other on the floor than this, m, in 3 of 5 frames belong to
-        /// one person, and the older one is kept. A detection so near to a supported track starts
-        /// no track; with `[births]`, neither does one near a track that is predicted there for sure.
+        /// Distance on the floor, m, below which two tracks in 3 of 5 frames belong to one person;
+        /// the older one is kept. A detection this near to a supported track starts no track; with
+        /// `[births]`, neither does one this near to a track whose prediction is certain.
         #[schemars(range(min = 0.0))]
         pub duplicate_m: f64 = 0.2,
-        /// Most tracks at a time; the ones with the lowest scores end.
+        /// Largest number of tracks; the ones with the lowest scores end.
         #[schemars(range(min = 1))]
         pub max_tracks: usize = 256,
     }
@@ -70,42 +69,44 @@ settings! {
     /// Occlusion of people by nearer ones.
     #[non_exhaustive]
     pub struct OcclusionSettings {
-        /// A person is hidden if a smaller part than this is visible behind nearer people, and has
-        /// left the image if a smaller part is inside.
+        /// A person counts as hidden if a smaller share than this is visible behind nearer people,
+        /// and as out of the image if a smaller share is inside it.
         #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 1))]
         pub min_visible: f64 = 0.4,
-        /// A person hides another one only if nearer by at least this, m ...
+        /// Difference in distance from which a nearer person hides another one, m; `min_gap_sigmas`
+        /// applies as well.
         #[schemars(range(min = 0.0))]
         pub min_gap_m: f64 = 0.3,
-        /// ... and by at least this many standard deviations of the nearer person's range.
+        /// The same difference in standard deviations of the nearer person's range.
         #[schemars(range(min = 0.0))]
         pub min_gap_sigmas: f64 = 3.0,
-        /// Width of a body, m. The detection of a half-hidden person covers the visible half, and
-        /// its middle is off by up to half the width of the hidden part: its covariance is
-        /// increased by that. 0: it is not.
+        /// Width of a body, m. The detection of a half-hidden person covers the visible half, so
+        /// its centre is off by up to half the width of the hidden part, and its covariance is
+        /// increased by that. 0: no increase.
         #[schemars(range(min = 0.0))]
         pub body_width_m: f64 = 0.0,
     }
 }
 
 settings! {
-    /// New people: a detection whose track was lost starts a new track where a new person is the
-    /// likelier explanation of it.
+    /// New people near lost tracks: a detection that was associated with a lost track starts a new
+    /// track if a new person is the likelier explanation.
     #[non_exhaustive]
     pub struct BirthSettings {
         /// Density of new people in a frame, per m² of the floor. A track keeps a detection only if
-        /// its own density at that place, which falls as the track becomes uncertain, is higher. 0:
-        /// each track keeps what the associator gives it.
+        /// its own density at that position, which falls as the track becomes uncertain, is higher.
+        /// 0: each track keeps what the associator assigns to it.
         #[schemars(range(min = 0.0, max = 1e6))]
         pub inside_per_m2: f64 = 0.0,
-        /// The same at the left, right and lower border of the image.
+        /// The same density at the left, right and lower border of the image.
         #[schemars(range(min = 0.0, max = 1e6))]
         pub border_per_m2: f64 = 0.0,
-        /// Largest distance of a box at the border from it, in widths of the box.
+        /// Largest distance of a box from the border at which it counts as at the border, in widths
+        /// of the box.
         #[schemars(range(min = 0.0, max = 1e6))]
         pub border_widths: f64 = 0.1,
-        /// Part of the appearance: a factor of its log-likelihood ratio as the associator has it
-        /// (`[reidentification] association_weight`).
+        /// Weight of the appearance: a factor on its log-likelihood ratio, as the associator uses
+        /// it (`[reidentification] association_weight`).
         #[schemars(range(min = 0.0, max = 1e6))]
         pub appearance: f64 = 0.6,
     }
@@ -115,12 +116,14 @@ settings! {
     /// Boxes at the trunk that the depth image shows.
     #[non_exhaustive]
     pub struct SilhouetteSettings {
-        /// Reported boxes are moved sideways to the middle of the trunk, where the depth image shows it, by
-        /// this part of the way; a box that is not moved stands over a chest straight below the head. The
-        /// place in metres, which is that of the head, stays. 0: boxes are not moved.
+        /// Reported boxes are moved sideways towards the middle of the trunk, if the depth image
+        /// shows it, by this fraction of the distance; a box that is not moved covers a chest
+        /// straight below the head. The position in metres, which is that of the head, does not
+        /// change. 0: boxes are not moved.
         #[schemars(range(min = 0.0, max = 1.0))]
         pub weight: f64 = 0.0,
-        /// Readings belong to the trunk if they are nearer or farther by at most this than its middle, m.
+        /// Readings belong to the trunk if their depth differs from that of its middle by at most
+        /// this, m.
         #[schemars(range(min = 0.01, max = 1.0))]
         pub trunk_m: f64 = 0.2,
     }
@@ -149,18 +152,18 @@ pub enum Role {
 }
 
 settings! {
-    /// A `[[detectors]]` section without its `config`.
+    /// Keys of a `[[detectors]]` section other than its `config`.
     pub struct DetectorSettings {
         /// The plugin's name.
         pub plugin: String,
         /// Its roles: `discover`, `track`, `weigh`.
         pub roles: Vec<Role> = vec![Role::Discover],
-        /// It runs on every n-th frame ...
+        /// Runs on every n-th frame.
         pub every: u32 = 1,
-        /// ... starting with this one, counted from 0.
+        /// First frame on which it runs, counted from 0.
         pub offset: u32 = 0,
-        /// True if its detections are verified. Off for a detector that recognises tracked people
-        /// in views for which the verifiers are not made.
+        /// True if its detections are verified. Turn it off for a detector that recognises tracked
+        /// people in views for which the verifiers are not made.
         pub verify: bool = true,
     }
 }

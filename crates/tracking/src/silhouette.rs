@@ -1,5 +1,6 @@
-//! Boxes at the trunk that the depth image shows. The box of a track stands over its chest, which is
-//! assumed below the head; a person that leans, turns or carries something has it elsewhere.
+//! Boxes at the trunk that the depth image shows. The box of a track is placed over the chest,
+//! which is assumed straight below the head; a person that leans, turns or carries something has it
+//! elsewhere.
 
 use tagalong_core::{DepthImage, Frame, Track};
 use tagalong_geometry::Rect;

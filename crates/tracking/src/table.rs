@@ -1,4 +1,4 @@
-//! Table of the tracks, with the data of each beside the filter's state.
+//! Table of the tracks, with the data of each other than the filter's state.
 
 use std::collections::BTreeMap;
 

@@ -1,19 +1,20 @@
-//! Appearance of a pair beside its place, in one way for all associators.
+//! Combination of the position and the appearance of a pair, the same for all associators.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::probability;
 
-/// Combination of the place and the appearance of a pair.
+/// Combination of the position and the appearance of a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Fusion {
-    /// The log-likelihood ratio of the appearances is added: it may speak for a pair or against it.
+    /// The log-likelihood ratio of the appearances is added: it may support a pair or contradict
+    /// it.
     #[default]
     Sum,
-    /// The better of both counts, so that an appearance may help a pair and never harms it
-    /// (N. Aharon, R. Orfaig and B. Bobrovsky, *BoT-SORT: Robust Associations Multi-Pedestrian
+    /// The better of the two counts, so that an appearance may support a pair but never contradicts
+    /// it (N. Aharon, R. Orfaig and B. Bobrovsky, *BoT-SORT: Robust Associations Multi-Pedestrian
     /// Tracking*, arXiv 2206.14651, section 3.3: the smaller of two distances).
     Minimum,
 }

@@ -1,7 +1,7 @@
-//! The associators, each in a module of its name, and their shared parts: the cost of a pair of a
-//! track and a detection, its gate, and the global assignment with the least sum of costs.
+//! The associators, each in a module named after it, and their shared parts: the cost of a pair of
+//! a track and a detection, its gate, and the global assignment with the least sum of costs.
 //!
-//! An associator outside of this repository may use the shared parts, too.
+//! The shared parts are public for associators outside of this repository.
 
 mod assign;
 pub mod buffered;

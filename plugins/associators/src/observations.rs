@@ -1,4 +1,4 @@
-//! Boxes with which tracks were observed lately, for associators that compare a detection with an
+//! Boxes with which tracks were recently observed, for associators that compare a detection with an
 //! observation instead of a prediction.
 
 use std::collections::{BTreeMap, VecDeque};

@@ -7,14 +7,14 @@ use tagalong_geometry::Rect;
 
 use crate::{AppearanceFusion, Fusion, Stage, assign};
 
-/// Measure of the fit of a detection and a track.
+/// Measure of how well a detection fits a track.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Cost {
     /// Distance in the robot frame, in units of its uncertainty.
     #[default]
     Mahalanobis,
-    /// Overlap of the regions in the image.
+    /// Overlap of the boxes in the image.
     Overlap,
 }
 
@@ -29,8 +29,8 @@ pub enum Overlap {
     Dice,
 }
 
-/// Settings of the gate of a pair in metres and of the part of its appearance; flattened into those of
-/// associators.
+/// Settings of the gate of a pair in metres and of the weight of its appearance; flattened into
+/// those of associators.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct GateSettings {
@@ -38,18 +38,18 @@ pub struct GateSettings {
     /// of freedom.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub gate: f64,
-    /// Mahalanobis: largest distance on the floor, m, between frames that are close in time ...
+    /// Largest distance on the floor, m, between frames that are close in time; only with the
+    /// Mahalanobis distance as cost.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub gate_m: f64,
-    /// ... and by how much it grows with the time between them, m/s.
+    /// Growth of `gate_m` with the time between the frames, m/s.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub gate_speed_mps: f64,
-    /// Part of the appearance of a pair (`[reidentification] association_weight`): added to the
-    /// place (`sum`), or the better of both counts (`minimum`).
+    /// Combination with the appearance of a pair (`[reidentification] association_weight`): added
+    /// to the position (`sum`), or the better of the two (`minimum`).
     pub fusion: Fusion,
-    /// `minimum`: the appearance counts for pairs whose places are at least so similar:
-    /// exp(-d²/2) with the Mahalanobis distance d, or the overlap where that is the cost.
-    /// BoT-SORT has 0.5.
+    /// For `minimum`: least similarity of the positions at which the appearance counts: exp(-d²/2)
+    /// with the Mahalanobis distance d, or the overlap where that is the cost. BoT-SORT has 0.5.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub fusion_gate: f64,
 }

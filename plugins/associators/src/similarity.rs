@@ -1,4 +1,4 @@
-//! Assignment by similarity, in stages: as several trackers of boxes do it.
+//! Assignment by similarity, in stages, as in several trackers of boxes.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -86,23 +86,22 @@ pub fn probability(log_odds: f64) -> f64 {
     1.0 / (1.0 + (-log_odds).exp())
 }
 
-/// Order of detections and tracks, by score and confirmation, and the part of the appearance in
+/// Order of detections and tracks, by score and confirmation, and the weight of the appearance in
 /// associators of boxes; flattened into their settings.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct StageSettings {
-    /// Detections from these log-odds on are strong; 0.405 is a probability of 0.6.
+    /// Log-odds from which a detection is strong; 0.405 is a probability of 0.6.
     pub strong_log_odds: f64,
-    /// Tracks that are not confirmed get the detections that confirmed ones leave.
+    /// Tentative tracks get only the detections that confirmed tracks leave.
     pub confirmed_first: bool,
-    /// The overlap counts by the probability of the detection.
+    /// Weights the overlap with the probability of the detection.
     pub weigh_by_score: bool,
-    /// Part of the appearance of a pair (`[reidentification] association_weight`): added to the
-    /// place (`sum`), or the better of both counts (`minimum`).
+    /// Combination with the appearance of a pair (`[reidentification] association_weight`): added
+    /// to the position (`sum`), or the better of the two (`minimum`).
     pub fusion: Fusion,
-    /// `minimum`: the appearance counts for pairs whose places are at least so similar: the
-    /// overlap of the boxes, enlarged as in their stage.
-    /// BoT-SORT has 0.5.
+    /// For `minimum`: least overlap of the boxes, enlarged as in their stage, at which the
+    /// appearance counts. BoT-SORT has 0.5.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub fusion_gate: f64,
 }

@@ -1,9 +1,9 @@
-//! Verifies candidates by a small convolutional network on their whole bodies.
+//! Verifies candidates with a small convolutional network on their whole bodies.
 //!
-//! An upright plane through the candidate, from the floor to 2 m, is sampled in intensity and depth
-//! ([`NetworkInput`]), always at one scale. A network of four layers ([`Net`]) turns it into
-//! log-odds ([`Model`]). Without depth it gives no evidence, unless it is set and trained to go
-//! without.
+//! A vertical plane through the candidate, from the floor to 2 m, is sampled in intensity and depth
+//! ([`NetworkInput`]), always at one scale. A network of four layers ([`Net`]) turns the samples
+//! into log-odds ([`Model`]). Without depth it gives no evidence, unless it is configured and
+//! trained to work without.
 //!
 //! With the feature `train` the plugin also offers a trainer (`train`).
 //!

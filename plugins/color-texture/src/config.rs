@@ -3,36 +3,35 @@ use tagalong_core::settings;
 settings! {
     /// Settings of `color-texture`.
     pub struct Config {
-        /// Model file, relative to the config; empty: the model that is built in.
+        /// Model file, relative to the config; empty: the built-in model.
         pub model: String,
-        /// Weight of this verifier's log-odds beside the detector's score.
+        /// Weight of this verifier's log-odds relative to the detector's score.
         pub weight: f64 = 1.0,
-        /// Log-odds of one frame are limited to plus and minus this: one look is
-        /// never beyond doubt.
+        /// Bound on the log-odds of one frame, in both directions: a single frame is never certain.
         pub limit: f64 = 6.0,
-        /// Prior evidence, added to the evidence of each frame, log-odds. Below zero the verifier
-        /// is stricter.
+        /// Log-odds added to the evidence of each frame, as a prior. Below zero the verifier is
+        /// stricter.
         pub bias: f64 = 0.0,
-        /// Fit of a model; only `tagalong train` reads it.
+        /// Settings of the fit; only `tagalong train` reads them.
         pub training: Training,
     }
 }
 
 settings! {
-    /// Fit of a model.
+    /// Settings of the fit.
     pub struct Training {
-        /// Numbers of trees that are tried; each is one row of the card.
+        /// Numbers of trees to try; each is one row of the card.
         pub trees: Vec<usize> = vec![100, 200, 400, 800],
-        /// Each tree goes this part of its way.
+        /// Learning rate: the fraction of the values of each tree that is added.
         pub rate: f64 = 0.1,
-        /// Part of the features among which each tree chooses, at random.
+        /// Fraction of the features, chosen at random, among which each tree selects.
         pub features: f64 = 0.25,
-        /// Where a tree has few examples its values shrink: as if it had so many
-        /// more, undecided.
+        /// Shrinkage of the values of a tree that has few examples: as if it had this many more,
+        /// undecided ones.
         pub caution: f64 = 5.0,
-        /// Share of the weight of candidates without depth, photographs.
+        /// Share of the weight of candidates without depth (photographs).
         pub without_depth: f64 = 0.1,
-        /// Parts into which the groups are divided, each held out once.
+        /// Number of parts into which the groups are divided; each is held out once.
         pub folds: usize = 4,
     }
 }

@@ -1,11 +1,12 @@
-//! Doubts candidates by colour and texture, as P1 demands after its silhouettes, and by the shape
-//! of their surface in depth.
+//! Verifies candidates by colour and texture, which P1 demands after its silhouettes, and by the
+//! shape of their surface in depth.
 //!
 //! A candidate is reduced to numbers ([`Features`]): gradients, local binary patterns, colours of
-//! head and torso, the depth beyond the silhouette that the detector has already matched (a coat
-//! stand is thin below, a poster is flat, a plant is rough), and the gradients of all that is there
-//! from the floor up. A sum of small trees of decisions ([`Model`]) turns them into log-odds.
-//! Features that a frame lacks, colour in a grey log or depth in a photograph, have no vote.
+//! head and torso, the depth outside of the silhouette that the detector has already matched (a
+//! coat stand is thin below, a poster is flat, a plant is rough), and the gradients of the whole
+//! candidate from the floor up. A sum of small decision trees ([`Model`]) turns them into log-odds.
+//! Features that a frame lacks, such as colour in a grey log or depth in a photograph, have no
+//! vote.
 //!
 //! With the feature `train` the plugin also offers a trainer (`train`).
 //!

@@ -1,4 +1,4 @@
-//! Boxes of a search, and of the examples beside a person.
+//! Boxes that a search compares, and example boxes beside a person.
 
 use tagalong_geometry::Rect;
 

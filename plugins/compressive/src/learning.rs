@@ -1,4 +1,4 @@
-//! The rule by which appearances are learned, which a program may replace.
+//! Rule by which appearances are learned; a program may replace it.
 
 use std::fmt::Debug;
 use std::sync::Arc;

@@ -1,19 +1,20 @@
 //! `compressive`: finds a known person by their appearance (P2, section III-C; K. Zhang, L. Zhang
 //! and M.-H. Yang, *Fast compressive tracking*, TPAMI 36(10), 2014).
 //!
-//! A box is described by some dozens of numbers, each a few signed rectangles of an integral image:
-//! a sparse random projection of all rectangles there are, drawn once and never built as a matrix
-//! ([`Features`]). For each person two normal distributions a number are kept, one of boxes on the
-//! person and one of boxes beside them ([`Appearance`]); the best box is where the ratio of the two
-//! is largest, searched first coarsely and then finely around the expected one.
+//! A box is described by some dozens of features, each the sum of a few signed rectangles of an
+//! integral image: a sparse random projection of all possible rectangles, drawn once and never
+//! built as a matrix ([`Features`]). For each person and feature two normal distributions are kept,
+//! one of boxes on the person and one of boxes beside them ([`Appearance`]). The best box is the
+//! one with the largest ratio of the two; the search around the expected box is first coarse and
+//! then fine.
 //!
-//! Depth does what colour cannot: boxes that do not show something at the person's distance are not
-//! looked at, which both saves time and tells a hidden person from one whose appearance has
-//! changed; and it gives the scale.
+//! Depth does what colour cannot. Boxes whose depth does not match the person's distance are not
+//! compared, which saves time and distinguishes a hidden person from one whose appearance has
+//! changed. Depth also gives the scale.
 //!
-//! Such a tracker follows any object that it has learned, so most of the care goes into not
-//! learning: not from hidden people, not when unsure, and its score is too low to keep a track
-//! alive alone.
+//! Such a tracker follows any object that it has learned, so most of its rules prevent learning: it
+//! does not learn from hidden people or when it is uncertain, and its score is too low to keep a
+//! track alive alone.
 //!
 //! ```
 //! use tagalong_compressive::{Compressive, Config};

@@ -1,12 +1,12 @@
-//! Forecast of the place of a person over the next seconds, with its covariance.
+//! Forecast of a person's position over the next seconds, with its covariance.
 //!
-//! The velocity of a person decays at a rate and is disturbed by white acceleration, the more the
-//! faster the person walks (an Ornstein-Uhlenbeck process, whose integral is the place). The
-//! uncertainty of the state is a part of that of the filter of the track. Most people go on as they do,
-//! and few turn round, so that the place has long tails: it is distributed as Student's t, with ever
-//! fewer degrees of freedom. All settings are learnt from simulated walks by `cargo run --release -p
-//! tagalong-benches --example forecast`, which prints how many true places lie within the ellipses
-//! on walks that they were not learnt from.
+//! The velocity of a person decays at a constant rate and is disturbed by white acceleration, which
+//! grows with the speed of the person (an Ornstein-Uhlenbeck process, whose integral is the
+//! position). The uncertainty of the state is a fraction of that of the track's filter. Most people
+//! keep their motion and few turn round, so the position has long tails: it has a Student's t
+//! distribution, with degrees of freedom that fall with time. All settings are learned from
+//! simulated walks by `cargo run --release -p tagalong-benches --example forecast`, which prints
+//! how many true positions lie within the ellipses on walks that were not used for learning.
 
 use nalgebra::{Matrix2, Matrix4, Point2, Vector2};
 use tagalong_core::{EgoMotion, Track, settings};
@@ -29,20 +29,20 @@ settings! {
     /// Motion that is expected of people.
     #[derive(Copy)]
     pub struct ForecastSettings {
-        /// Rate at which a velocity decays, 1/s; 0 for a constant velocity.
+        /// Decay rate of the velocity, 1/s; 0 for a constant velocity.
         #[schemars(range(min = 0.0, max = 10.0))]
         pub damping_per_s: f64 = 0.1,
-        /// Spectral density of the acceleration of a standing person, m²/s³.
+        /// Spectral density of the acceleration of a person at rest, m²/s³.
         #[schemars(range(min = 0.0, max = 1e3))]
         pub unrest: f64 = 0.07,
-        /// Additional spectral density for each (m/s)² of the speed, 1/s.
+        /// Additional spectral density per (m/s)² of squared speed, 1/s.
         #[schemars(range(min = 0.0, max = 1e3))]
         pub unrest_by_speed: f64 = 0.0,
-        /// Factor on the covariance that the filter of the track states.
+        /// Factor on the covariance that the track's filter reports.
         #[schemars(range(min = 0.0, max = 100.0))]
         pub filter_part: f64 = 0.5,
-        /// Degrees of freedom of the place after a second, beyond two; they fall with the square of
-        /// the time.
+        /// Degrees of freedom of the position after one second, beyond two; they fall with the
+        /// square of the time.
         #[schemars(range(min = 0.1, max = 1e9))]
         pub tail_dof: f64 = 6.0,
     }

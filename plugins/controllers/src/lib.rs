@@ -1,6 +1,6 @@
-//! The controllers, each in a module of its name, and their shared parts: the commands that the
-//! wheels have not executed yet, the time step of a frame, the caution towards a target that was
-//! not seen lately, and the forecast of people.
+//! The controllers, each in a module named after it, and their shared parts: the commands that the
+//! wheels have not executed yet, the time step of a frame, the slower approach to a target that was
+//! not seen recently, and the forecast of people.
 //!
 //! ```
 //! use nalgebra::Vector2;

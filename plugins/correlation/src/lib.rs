@@ -1,16 +1,16 @@
 //! `correlation`: finds a known person in the part of the scene that only one camera of a stereo
-//! pair sees, by the picture that was remembered of them.
+//! pair sees, by a remembered picture of them.
 //!
 //! Beside a person near the robot lies a strip that the left camera sees and the right one does
-//! not. It has no depth, so depth detectors find no person there, and that is where people come
-//! into view again after another person passed in between. Their appearance is known from before:
-//! each person's upper body is remembered while depth tells its outline ([`Picture`]), and slid
-//! over the image around the expected place, at the scale of the expected distance. Normalised
-//! cross-correlation, over the pixels of the body that nothing nearer hides, is the measure of fit
+//! not. It has no depth, so depth detectors find no person there, and it is where people reappear
+//! after another person passed in front of them. Their appearance is known from before: each
+//! person's upper body is remembered while depth shows its outline ([`Picture`]), and is shifted
+//! over the image around the expected position, at the scale of the expected distance. The measure
+//! of fit is normalised cross-correlation over the pixels of the body that nothing nearer hides
 //! ([`Strip`]).
 //!
-//! A picture gives the direction and not the distance: that stays the expected one. The plugin
-//! answers only where there is no depth.
+//! A picture gives the direction but not the distance, which remains the expected one. The plugin
+//! reports detections only where there is no depth.
 //!
 //! ```
 //! use tagalong_conformance::figure::{Figure, World};

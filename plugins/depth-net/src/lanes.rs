@@ -1,8 +1,8 @@
-//! Points and voxels of a camera side by side, so that one instruction works on several of them.
+//! Points and voxels of a camera in lanes, so that one instruction processes several of them.
 //!
-//! Loops over lanes have one body without branches, which the compiler turns into vector instructions.
-//! Each lane does the same operations in the same order as [`Camera`] does for one point, and therefore
-//! has the same bits.
+//! Loops over lanes have one body without branches, which the compiler turns into vector
+//! instructions. Each lane does the same operations in the same order as [`Camera`] does for one
+//! point, so the result has the same bits.
 
 use nalgebra::{Matrix3, Point2, Vector3};
 use tagalong_geometry::{Camera, Distortion, Lens, Pinhole};

@@ -1,16 +1,16 @@
 //! `depth-net`: people in a plan view of the depth image, by a small convolutional network.
 //!
-//! The points of the depth image are collected in a map of the floor ([`FloorMap`]): the surface
-//! per slab of height, the greatest height, and the voxels that the camera sees to be empty or
-//! cannot see, behind others or outside of its image. So a person has the same size and shape at
-//! every distance and camera height, and a head that lies above the image is known to be unknown.
-//! A fully convolutional network ([`Net`]) turns the map into log-odds, the place and the height
-//! of a head for each cell; [`Peak`]s of the log-odds are people.
+//! The points of the depth image are collected in a map of the floor ([`FloorMap`]): the surface in
+//! each slab of height, the greatest height, and the voxels that are seen to be empty or cannot be
+//! seen, because they are behind others or outside of the image. A person therefore has the same
+//! size and shape at every distance and camera height, and the map shows that a head above the
+//! image is unknown. A fully convolutional network ([`Net`]) turns the map into log-odds, and the
+//! position and height of a head, for each cell; [`Peak`]s of the log-odds are people.
 //!
-//! The points of a 3-D lidar make the same map, in each quarter around the robot.
+//! The points of a 3-D lidar fill the same map, for each quarter around the robot.
 //!
 //! The detector `depth-net` discovers people and finds tracked ones again. The verifier
-//! `depth-net-verifier` returns the log-odds of the same map at a candidate's place.
+//! `depth-net-verifier` returns the log-odds of the same map at a candidate's position.
 //!
 //! `tagalong model --export depth-net FILE.onnx` writes the network as an ONNX file.
 //!

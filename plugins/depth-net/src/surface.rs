@@ -1,4 +1,4 @@
-//! Place and height of a head from the depth image around it.
+//! Position and height of a head from the depth image around it.
 
 use std::sync::Arc;
 

@@ -1,4 +1,5 @@
-//! Places that one scan drops: counts of all places, and some of them with the values measured there.
+//! Positions that one scan drops: the count of all, and some of them with the values measured
+//! there.
 
 use tagalong_core::{Funnel, Measured};
 

@@ -1,4 +1,4 @@
-//! Steps of the detector that a program may replace by others.
+//! Steps of the detector that a program may replace.
 
 use std::sync::Arc;
 

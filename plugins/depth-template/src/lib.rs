@@ -1,16 +1,16 @@
 //! Finds people in depth images by the silhouette of head and shoulders (P1 section 2.2, P4 section
 //! II).
 //!
-//! The path of a pixel: is it at a height and depth where a head can be
-//! ([`DepthTemplateConfig::min_head_height_m`]), is the scene farther away left, right and above of
-//! it (P4's boundary points), is the object that it belongs to as wide as a head, is there a body
-//! below; then, does the silhouette of one of three body directions fit ([`Matcher`])? The
-//! remaining pixels are grouped into people.
+//! The tests of a pixel, in order: its height and depth allow a head
+//! ([`DepthTemplateConfig::min_head_height_m`]); the scene left, right and above of it is farther
+//! away (P4's boundary points); the object that it belongs to is as wide as a head; there is a body
+//! below; and the silhouette of one of three body directions fits ([`Matcher`]). The remaining
+//! pixels are grouped into people.
 //!
-//! Why not the printed squared difference of depths against one background value? Because a wall
-//! two metres behind a person then costs more than the person fits, and because a fixed threshold
-//! means something else at every range. The README lists the differences, with the test behind
-//! each.
+//! The printed squared difference of depths from one background value is not used, because with it
+//! a wall two metres behind a person costs more than the person gains, and because a fixed
+//! threshold has a different meaning at every range. The README lists the differences, each with
+//! its test.
 
 mod bank;
 mod body;

@@ -1,4 +1,4 @@
-//! Parts of a cascade.
+//! Parts of a cascade of classifiers.
 
 /// A rectangle of a window, in its pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,4 +1,4 @@
-//! A cascade for neighbouring windows: features are offsets into sums.
+//! A cascade prepared for neighbouring windows: features are offsets into integral images.
 
 use crate::cascade::{Cascade, Feature, Next, Node, Part, Split, Tree};
 use crate::level::Level;

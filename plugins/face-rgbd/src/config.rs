@@ -4,46 +4,46 @@ use tagalong_core::{Result, settings};
 settings! {
     /// Settings of `face-rgbd`.
     pub struct Config {
-        /// Cascade in OpenCV's XML, relative to the config; empty: the built-in one. Training
-        /// continues from it; empty: begins anew.
+        /// Cascade in OpenCV's XML format, relative to the config; empty: the built-in one.
+        /// Training continues from it; empty: training starts anew.
         pub model: String,
-        /// Faces with lower log-odds are dropped.
+        /// Least log-odds of a face; faces with less are dropped.
         pub min_score: f64 = 0.0,
         /// Upper limit of the log-odds.
         #[schemars(range(min = 1e-6, max = 1e6))]
         pub max_score: f64 = 6.0,
-        /// A face is a group of more windows than this.
+        /// Number of grouped windows that a face must exceed (OpenCV's `minNeighbors`).
         pub min_neighbours: usize = 2,
-        /// Narrowest window in a search, pixels.
+        /// Narrowest window of a search, pixels.
         #[schemars(range(min = 1e-6, max = 1e6))]
         pub min_side_px: f64 = 24.0,
         /// Widest window, as a fraction of the shorter side of the image.
         #[schemars(range(min = 1e-6, max = 1e6))]
         pub max_side: f64 = 0.9,
-        /// Ratio of each size to the one before.
+        /// Ratio of each window size to the one before.
         #[schemars(range(min = 1.02, max = 4.0))]
         pub scale_step: f64 = 1.05,
-        /// Searches only where depth and geometry allow a face; off: everywhere.
+        /// Searches only where depth and geometry allow a face; false: everywhere.
         pub depth_proposals: bool = true,
-        /// With depth: least width of a window, m.
+        /// With depth: narrowest window, m.
         #[schemars(range(min = 1e-6, max = 1e6))]
         pub min_face_m: f64 = 0.10,
-        /// With depth: largest width of a window, m.
+        /// With depth: widest window, m.
         #[schemars(range(min = 1e-6, max = 1e6))]
         pub max_face_m: f64 = 0.19,
-        /// Range of distances of faces, m.
+        /// Nearest face, m.
         pub min_depth_m: f64 = 0.5,
-        /// See `min_depth_m`.
+        /// Farthest face, m.
         #[schemars(range(min = 1e-6, max = 1e6))]
         pub max_depth_m: f64 = 6.0,
-        /// Range of heights of faces above the floor, m.
+        /// Lowest face above the floor, m.
         pub min_height_m: f64 = 0.8,
-        /// See `min_height_m`.
+        /// Highest face above the floor, m.
         pub max_height_m: f64 = 2.1,
-        /// Most sampling points (one in 8 x 8 pixels) that are searched; regions with much skin
-        /// come first.
+        /// Largest number of sampling points (one in 8 x 8 pixels) that are searched; regions with
+        /// much skin colour come first.
         pub max_points: usize = 5000,
-        /// Width of the window of a face, m: gives the distance where there is no depth.
+        /// Width of the window of a face, m; it gives the distance where there is no depth.
         #[schemars(range(min = 1e-6, max = 1e6))]
         pub face_m: f64 = 0.135,
         /// Distance of the centre of the head above that of the window, as a fraction of the
@@ -68,27 +68,27 @@ settings! {
     pub struct Training {
         /// Side of a window, pixels.
         pub side: usize = 20,
-        /// Largest angle by which copies of the faces are turned, rad.
+        /// Largest angle by which copies of the faces are rotated, rad.
         pub tilt: f64 = 0.15,
-        /// Most stages.
+        /// Largest number of stages.
         pub stages: usize = 12,
-        /// Part of the faces that every stage has to pass.
+        /// Least share of the faces that every stage has to pass.
         pub min_hit_rate: f64 = 0.995,
-        /// Part of the other windows that a stage may pass.
+        /// Largest share of the other windows that a stage may pass.
         pub max_false_alarm: f64 = 0.4,
-        /// Most trees of a stage.
+        /// Largest number of trees in a stage.
         pub max_trees: usize = 100,
-        /// Number of questions from the root of a tree to a leaf.
+        /// Number of decisions from the root of a tree to a leaf.
         pub depth: usize = 2,
         /// Number of features that a stage chooses from, sampled anew for each stage.
         pub features: usize = 2500,
-        /// Number of other windows for the training of a stage; all stages before it pass them.
+        /// Number of other windows for the training of a stage; they pass all stages before it.
         pub others: usize = 5000,
-        /// Fewest other windows for a further stage: it would learn fewer by heart, so training
-        /// ends.
+        /// Least number of other windows for a further stage; with fewer it would overfit, so
+        /// training ends.
         pub fewest_others: usize = 300,
         /// Tenths of the pictures, 2 to 9, for calibration and validation; 0 and 1 are held out,
-        /// and the others are trained with.
+        /// and the others are used for training.
         pub calibration: Vec<u64> = vec![2],
     }
 }

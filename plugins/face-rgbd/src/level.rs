@@ -1,4 +1,4 @@
-//! One size of an image: its pixels and their sums.
+//! An image at one scale: its pixels and their integral images.
 
 use tagalong_core::GreyImage;
 

@@ -1,15 +1,15 @@
-//! `face-rgbd`: faces by a cascade of Haar-like features, where depth and geometry allow them (P2,
-//! section III-A; P. Viola and M. Jones, *Rapid object detection using a boosted cascade of simple
-//! features*, CVPR 2001).
+//! `face-rgbd`: finds faces with a cascade of Haar-like features, where depth and geometry allow
+//! them (P2, section III-A; P. Viola and M. Jones, *Rapid object detection using a boosted cascade
+//! of simple features*, CVPR 2001).
 //!
-//! The depth image is sampled on a grid of points. Those at heights and distances of faces are
-//! connected to regions, which are ranked by their share of skin colour. The windows of a
-//! [`Cascade`] are scanned only there, and only in the sizes that the distance allows. Without
-//! depth the whole image is scanned, in all sizes.
+//! The depth image is sampled on a grid of points. Points at heights and distances that faces have
+//! are connected to regions, which are ranked by their share of skin colour. The windows of a
+//! [`Cascade`] are scanned only there, and only at the sizes that the distance allows. Without
+//! depth the whole image is scanned, at all sizes.
 //!
-//! A detection is that of a person: the upper-body square below the face.
+//! A detection is the upper-body square below the face.
 //!
-//! Cascades are XML files of OpenCV's format; with the feature `train` the plugin offers a trainer
+//! Cascades are XML files in OpenCV's format; with the feature `train` the plugin offers a trainer
 //! for them (`train`).
 
 mod cascade;

@@ -1,5 +1,5 @@
-//! Proposals for faces: sampling points that depth and geometry allow, in regions that are ranked
-//! by the colour of skin (P2, section III-A, after Vo-Duc, Masselli and Zell 2012).
+//! Proposals for faces: sampling points that depth and geometry allow, in regions ranked by skin
+//! colour (P2, section III-A, after Vo-Duc, Masselli and Zell 2012).
 
 use nalgebra::Point2;
 use tagalong_core::{DepthImage, Frame, RgbImage};

@@ -1,4 +1,4 @@
-//! Scan of windows over an image in many sizes, as in OpenCV's `detectMultiScale`.
+//! Scan of an image with windows of many sizes, as in OpenCV's `detectMultiScale`.
 
 use std::ops::Range;
 

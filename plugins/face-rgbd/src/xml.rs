@@ -1,9 +1,9 @@
-//! XML files of OpenCV: the layout of `opencv_traincascade`, read and written, and the older one of
-//! `opencv_haartraining`, read.
+//! XML files of OpenCV: reads and writes the layout of `opencv_traincascade`, and reads the older
+//! one of `opencv_haartraining`.
 //!
-//! In the newer layout a node is `left right feature` and its question; positive numbers lead to
-//! other nodes, others, negated, to leaves, so 0 is leaf 0. In the older one all parts are named
-//! elements.
+//! In the newer layout a node is `left right feature` and its threshold; positive numbers refer to
+//! other nodes, the others, negated, to leaves, so 0 is leaf 0. In the older one all parts are
+//! named elements.
 
 use std::fmt::Write as _;
 

@@ -1,5 +1,5 @@
-//! The filters without a random number, each in a module of its name: they estimate the position of
-//! each person from all evidence.
+//! The filters without random numbers, each in a module named after it: they estimate the position
+//! of each person from all evidence.
 //!
 //! ```
 //! use tagalong_conformance::samples::detection_at;

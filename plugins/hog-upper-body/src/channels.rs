@@ -1,5 +1,5 @@
 //! Aggregated channels: brightness, gradients and their directions, averaged over small cells and
-//! normalised by their surroundings (after P. Dollar et al., *Fast feature pyramids for object
+//! normalised by their neighbourhood (after P. Dollar et al., *Fast feature pyramids for object
 //! detection*, PAMI 36, 2014).
 
 use std::ops::Range;

@@ -6,16 +6,15 @@ use crate::{Coverage, Kind};
 settings! {
     /// Settings of `hog-upper-body`.
     pub struct Config {
-        /// Machine that classifies windows: `trees` on fine cells, or `linear` on normalised
-        /// blocks.
+        /// Classifier of windows: `trees` on fine cells, or `linear` on normalised blocks.
         pub machine: Kind,
-        /// Part of a person that windows show: `upper-body`, or `whole-body`, which machine
-        /// `linear` does not know.
+        /// Part of a person that windows show: `upper-body`, or `whole-body`, which `linear` does
+        /// not support.
         pub coverage: Coverage,
-        /// Model file, relative to the config; the file states its machine and the part.
-        /// Empty: the built-in model of the chosen ones.
+        /// Model file, relative to the config; the file states its classifier and the part. Empty:
+        /// the built-in model for the chosen ones.
         pub model: String,
-        /// Windows with lower log-odds are dropped.
+        /// Least log-odds of a window; windows with less are dropped.
         pub min_score: f64 = 0.0,
         /// Upper limit of the log-odds.
         #[schemars(range(min = 1e-6, max = 1e6))]
@@ -26,39 +25,39 @@ settings! {
         /// Largest upper body, as a fraction of the shorter side of the image.
         #[schemars(range(min = 1e-6, max = 1e6))]
         pub max_side: f64 = 0.9,
-        /// Ratio of each size to the one before.
+        /// Ratio of each window size to the one before.
         #[schemars(range(min = 1.02, max = 4.0))]
         pub scale_step: f64 = 1.15,
-        /// With depth: factor by which a window may be larger or smaller than its distance
-        /// predicts.
+        /// With depth: largest factor between the size of a window and the size that its distance
+        /// predicts, in either direction.
         #[schemars(range(min = 1.0, max = 1e3))]
         pub size_tolerance: f64 = 1.08,
-        /// Range of distances of people, m.
+        /// Nearest person, m.
         pub min_depth_m: f64 = 0.5,
-        /// See `min_depth_m`.
+        /// Farthest person, m.
         #[schemars(range(min = 1e-6, max = 1e6))]
         pub max_depth_m: f64 = 7.0,
         /// With depth: a square shows no head if most of the points above it are as far away as it
-        /// is, to within this, m; 0: not tested.
+        /// is, within this tolerance, m; 0: not tested.
         #[schemars(range(min = 0.0, max = 1e6))]
         pub above_m: f64 = 0.25,
-        /// Range of heights of a head's centre above the floor, m.
+        /// Lowest head centre above the floor, m.
         pub min_head_height_m: f64 = 0.8,
-        /// See `min_head_height_m`.
+        /// Highest head centre above the floor, m.
         pub max_head_height_m: f64 = 2.1,
-        /// Scans only windows that depth and geometry allow; off: all windows.
+        /// Scans only windows that depth and geometry allow; false: all windows.
         pub depth_proposals: bool = true,
         /// With depth: adds the log-odds of the depth channel, if the model has one.
         pub depth_channel: bool = false,
-        /// Two windows that overlap by more (IoU of the squares, or of whole bodies) belong to one
-        /// person ...
+        /// Overlap (IoU of the squares, or of whole bodies) above which two windows belong to one
+        /// person, unless `apart_m` separates them.
         #[schemars(range(min = 0.0, max = 1e6))]
         pub overlap: f64 = 0.4,
-        /// ... unless they are farther apart than this in depth, m.
+        /// Difference in depth above which overlapping windows belong to two people, m.
         #[schemars(range(min = 0.0, max = 1e6))]
         pub apart_m: f64 = 0.4,
-        /// A search near a track scans windows with their centre nearer than this to the expected
-        /// one, widths.
+        /// Radius around the expected position in which a search near a track scans windows, by
+        /// their centre, widths.
         #[schemars(range(min = 0.0, max = 1e6))]
         pub near: f64 = 0.5,
         /// Standard deviation of the position of a window, as a fraction of its side.
@@ -79,15 +78,16 @@ settings! {
     /// Settings of the fit of a model.
     pub struct Training {
         /// Trees: false alarms in annotated rooms and, for upper bodies, the people there are
-        /// examples beside those of photographs; off: rooms teach the depth channel alone.
+        /// examples in addition to those of photographs; false: rooms are used for the depth
+        /// channel alone.
         pub rooms: bool = false,
-        /// Linear: penalty of a training error, of windows with people ...
+        /// Linear: penalty of a training error on a window with a person.
         pub person_penalty: f64 = 0.02,
-        /// ... and of windows without.
+        /// Linear: penalty of a training error on a window without a person.
         pub other_penalty: f64 = 0.01,
-        /// Linear: most passes over all windows.
+        /// Linear: largest number of passes over all windows.
         pub epochs: usize = 40,
-        /// Number of trees of the last round; each round has a quarter of the trees of the next.
+        /// Number of trees in the last round; each round has a quarter of the trees of the next.
         pub trees: usize = 1536,
         /// Number of values of a window that a tree chooses from, sampled anew for each tree.
         pub numbers: usize = 128,
@@ -95,9 +95,9 @@ settings! {
         pub random_windows: usize = 10,
         /// Number of searches for false alarms in pictures without people.
         pub mining_rounds: usize = 3,
-        /// Most false alarms that are kept of one picture in one round.
+        /// Largest number of false alarms that are kept from one picture in one round.
         pub mined_per_picture: usize = 40,
-        /// Most false alarms that are kept of one round.
+        /// Largest number of false alarms that are kept in one round.
         pub mined_per_round: usize = 6000,
     }
 }

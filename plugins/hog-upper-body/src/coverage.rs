@@ -11,10 +11,10 @@ pub const SIDE: usize = 7;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Coverage {
-    /// Head, trunk and hips: people whose legs are hidden or outside of the image are found.
+    /// Head, trunk and hips: finds people whose legs are hidden or outside of the image.
     #[default]
     UpperBody,
-    /// Head to feet: fewer false alarms among people standing free. For trees only.
+    /// Head to feet: fewer false alarms for people in the open. For trees only.
     WholeBody,
 }
 

@@ -1,8 +1,8 @@
-//! Depth around a person: a small set of trees of its own, for frames with a depth image.
+//! Depth around a person: a small set of separate trees, for frames with a depth image.
 //!
-//! A person is nearer than the surroundings left and right of the head and beside the hips, and
-//! the depth of the body varies little. The values of a window are those of 8 by 8 cells, relative
-//! to the depth of its object, so that they do not depend on light, clothes or distance.
+//! A person is nearer than the surroundings to the left and right of the head and beside the hips,
+//! and the depth of the body varies little. The values of a window are the depths of 8 by 8 cells
+//! relative to the depth of its object, so they do not depend on light, clothes or distance.
 
 use tagalong_core::DepthImage;
 use tagalong_geometry::Rect;

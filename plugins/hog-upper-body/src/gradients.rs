@@ -1,4 +1,4 @@
-//! Gradients of a row of pixels, and their votes for directions.
+//! Gradients of a row of pixels, and their votes for orientation bins.
 
 /// Number of pixels that are processed at once.
 pub(crate) const LANES: usize = 8;

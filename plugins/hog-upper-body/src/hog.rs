@@ -1,4 +1,4 @@
-//! Cells and normalised blocks of histograms of gradients.
+//! Cells and normalised blocks of histograms of oriented gradients.
 
 use crate::Spans;
 use crate::gradients::{Gradients, LANES, Votes, votes};

@@ -1,4 +1,4 @@
-//! Machines in the form in which they are run: on neighbouring windows of an image in one size.
+//! Classifiers in the form in which they are run: on neighbouring windows of an image at one scale.
 
 use crate::Spans;
 use crate::channels::{Channels, DEPTH, Planes};

@@ -1,9 +1,9 @@
-//! Depth in the middle of all windows of one size.
+//! Depth at the centres of all windows of one size.
 //!
-//! Windows lie a quarter of their square apart, and the depth of one is read at five by five places
-//! that are an eighth of it apart. Neighbours therefore share places: all windows together are read
-//! on one lattice, each place once, and counts of the readings before and behind a range decide if
-//! the median of a window's readings lies within it.
+//! Windows are a quarter of their square apart, and the depth of a window is read at five by five
+//! points that are an eighth of the square apart. Neighbouring windows therefore share points: all
+//! windows together are read on one lattice, each point once. Counts of the readings before and
+//! behind a range show whether the median of a window's readings lies within it.
 
 use std::ops::{Range, RangeInclusive};
 

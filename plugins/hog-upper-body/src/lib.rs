@@ -1,14 +1,14 @@
-//! `hog-upper-body`: upper bodies by histograms of oriented gradients and a linear support vector
-//! machine (P2, section III-B; N. Dalal and B. Triggs, *Histograms of oriented gradients for human
-//! detection*, CVPR 2005), or, with fewer errors, by boosted trees over finer cells.
+//! `hog-upper-body`: finds upper bodies by histograms of oriented gradients and a linear support
+//! vector machine (P2, section III-B; N. Dalal and B. Triggs, *Histograms of oriented gradients for
+//! human detection*, CVPR 2005) or, with fewer errors, by boosted trees over finer cells.
 //!
-//! The image is scanned in several sizes. In each, the features are computed once: cells of 8x8
-//! pixels and normalised blocks of them ([`Blocks`]), or cells of 4x4 pixels ([`Channels`]). A
-//! window is then a dot product of 7x7 blocks with the weights of a [`Model`], or the sum of its
-//! trees over 16x16 cells, both read in place.
+//! The image is scanned at several scales. At each scale, the features are computed once: cells of
+//! 8x8 pixels and normalised blocks of them ([`Blocks`]), or cells of 4x4 pixels ([`Channels`]).
+//! The score of a window is then a dot product of 7x7 blocks with the weights of a [`Model`], or
+//! the sum of its trees over 16x16 cells, both read in place.
 //!
-//! With depth, a window is scanned only if a person at the distance of its middle would be as large
-//! as it is, and would have the head at a height where heads are. Without depth, all windows are
+//! With depth, a window is scanned only if a person at the distance of its centre would be as large
+//! as the window, and would have the head at a plausible height. Without depth, all windows are
 //! scanned.
 //!
 //! With the feature `train` the plugin also offers a trainer (`train`).

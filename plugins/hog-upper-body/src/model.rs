@@ -15,11 +15,11 @@ pub const NUMBERS: usize = SIDE * SIDE * BLOCK;
 
 const FORMAT: &str = "hog-upper-body 3";
 
-/// Kind of machine that classifies windows.
+/// Kind of classifier of windows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
-    /// Normalised blocks of cells and a linear machine.
+    /// Normalised blocks of cells and a linear classifier.
     Linear,
     /// Finer cells and boosted trees: fewer errors.
     #[default]

@@ -1,4 +1,4 @@
-//! Scan of windows over an image in many sizes.
+//! Scan of an image with windows of many sizes.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! Parts of an island that are needed: windows seldom fill the rectangle around them.
+//! Parts of an island that are needed, because windows seldom fill the rectangle around them.
 
 use std::ops::Range;
 

@@ -1,18 +1,18 @@
-//! `joint-particle`: a particle filter that weighs scenes of overlapping silhouettes (P3).
+//! `joint-particle`: a particle filter that weights scenes of overlapping silhouettes (P3).
 //!
 //! A single person is a cloud of particles. When silhouettes overlap in the image, the clouds
-//! become one of joint particles: each is a scene, with the nearer person in front of the farther
-//! one, and the detector's likelihood measures how well the scene explains the image. A hidden
-//! person gets a flat likelihood, and moves on as before.
+//! become one cloud of joint particles: each is a scene, with the nearer person in front of the
+//! farther one, and the detector's likelihood measures how well the scene explains the image. A
+//! hidden person has a flat likelihood, and keeps moving as before.
 //!
-//! P3 samples every number of the state. But 100 or 625 particles in five or ten dimensions are
-//! few, and depth and height then get lost as in P3's Figure 9. Only the position across the
-//! viewing ray has a likelihood with several peaks (left or right of the nearer person), so only
-//! that is sampled; the rest of each particle is a small Kalman filter, conditioned on the sample
-//! (Rao-Blackwellisation; Schön, Gustafsson and Nordlund 2005).
+//! P3 samples every component of the state. But 100 or 625 particles in five or ten dimensions are
+//! few, and depth and height then diverge as in P3's Figure 9. Only the likelihood of the position
+//! across the viewing ray has several peaks (left or right of the nearer person), so only that
+//! position is sampled; the rest of each particle is a small Kalman filter, conditioned on the
+//! sample (Rao-Blackwellisation; Schön, Gustafsson and Nordlund 2005).
 //!
-//! The methods of the paper, its likelihood maps included, are settings; other schemes of sampling are
-//! [`SamplingSteps`].
+//! The methods of the paper, including its likelihood maps, are settings; other sampling schemes
+//! are [`SamplingSteps`].
 //!
 //! ```
 //! use tagalong_conformance::samples::detection_at;

@@ -1,4 +1,4 @@
-//! Sampling steps of the filter, which a program may replace by those of another scheme.
+//! Sampling steps of the filter; a program may replace them by those of another scheme.
 
 use std::fmt::Debug;
 use std::sync::Arc;

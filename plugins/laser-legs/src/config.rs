@@ -8,32 +8,32 @@ settings! {
         pub model: String,
         /// Division of a scan into segments.
         pub segments: Segmentation,
-        /// A segment below these log-odds is no leg.
+        /// Least log-odds of a leg; segments with less are not used.
         #[schemars(range(min = -100.0, max = 100.0))]
         pub min_leg_log_odds: f64 = -1.0,
-        /// Two legs belong to one person if their middles are no farther apart, m.
+        /// Largest distance between the centres of the two legs of a person, m.
         #[schemars(range(min = 0.0, max = 2.0))]
         pub max_stride_m: f64 = 0.7,
-        /// Added to the log-odds of a single leg: most segments like legs are furniture.
+        /// Log-odds added to those of a single leg, because most leg-like segments are furniture.
         #[schemars(range(min = -10.0, max = 10.0))]
         pub single_log_odds: f64 = 0.0,
-        /// Added to the sum of both legs' log-odds.
+        /// Log-odds added to the sum over both legs.
         #[schemars(range(min = -10.0, max = 10.0))]
         pub pair_log_odds: f64 = 0.5,
-        /// Added to the log-odds of a person where nothing was in the last two seconds, and taken
-        /// from them where something was: people move, furniture does not. Only for robots with
-        /// odometry, or at rest; 0: earlier scans are not looked at.
+        /// Log-odds added for a person at a position that was free in the last two seconds, and
+        /// subtracted where it was occupied: people move, furniture does not. Only for robots with
+        /// odometry, or at rest; 0: earlier scans are not used.
         #[schemars(range(min = 0.0, max = 10.0))]
         pub free_log_odds: f64 = 0.0,
-        /// Log-odds of a detection are limited to plus and minus this: one scan is never beyond
-        /// doubt.
+        /// Bound on the log-odds of a detection, in both directions: a single scan is never
+        /// certain.
         #[schemars(range(min = 0.0, max = 100.0))]
         pub limit: f64 = 3.0,
-        /// Standard deviation of the place of a person of whom both legs are seen, along either
-        /// axis of the floor, m.
+        /// Standard deviation of the position of a person with both legs visible, along either axis
+        /// of the floor, m.
         #[schemars(range(min = 0.001, max = 2.0))]
         pub pair_sigma_m: f64 = 0.08,
-        /// The same if one leg is seen: the other one may be on any side of it.
+        /// The same with one leg visible: the other one may be on any side of it.
         #[schemars(range(min = 0.001, max = 2.0))]
         pub single_sigma_m: f64 = 0.16,
         /// Height at which the centre of the head is assumed, m. A scan contains no information on
@@ -48,19 +48,19 @@ settings! {
 settings! {
     /// Division of a scan into segments.
     pub struct Segmentation {
-        /// Neighbouring points belong together if they are no farther apart than this, m, ...
+        /// Largest distance between neighbouring points of a segment, m; `jump_rays` adds to it.
         #[schemars(range(min = 0.001, max = 2.0))]
         pub jump_m: f64 = 0.1,
-        /// ... plus so many times the distance of two rays at their range.
+        /// Addition to this distance, as a multiple of the spacing of two rays at their range.
         #[schemars(range(min = 0.0, max = 100.0))]
         pub jump_rays: f64 = 1.5,
-        /// Rays without a reflection that may lie between neighbouring points.
+        /// Largest number of rays without a return between neighbouring points of a segment.
         #[schemars(range(min = 0, max = 100))]
         pub gap_rays: u32 = 1,
-        /// Segments of fewer points are noise.
+        /// Least number of points of a segment; smaller ones are noise.
         #[schemars(range(min = 1, max = 1000))]
         pub min_points: usize = 2,
-        /// Segments that are wider than this are walls and furniture, m.
+        /// Largest width of a segment, m; wider ones are walls and furniture.
         #[schemars(range(min = 0.01, max = 10.0))]
         pub max_width_m: f64 = 0.6,
     }
@@ -69,18 +69,19 @@ settings! {
 settings! {
     /// Settings of the fit.
     pub struct Training {
-        /// Numbers of trees to try; the one with the best held-out ranking is taken.
+        /// Numbers of trees to try; the one that ranks the held-out segments best is used.
         pub trees: Vec<usize> = vec![50, 100, 200],
-        /// Questions from the root of a tree to a leaf.
+        /// Number of decisions from the root of a tree to a leaf.
         #[schemars(range(min = 1, max = 6))]
         pub depth: usize = 3,
         /// Number of parts into which the groups are divided; each is held out once.
         #[schemars(range(min = 2, max = 100))]
         pub folds: usize = 3,
-        /// Each scan is also shown with every so-many-th ray only.
+        /// Training also uses each scan with only every n-th ray, for each n in this list.
         pub every_ray: Vec<u32> = vec![2, 3],
-        /// A segment is a leg if its middle is no farther from an annotated leg than this, m;
-        /// beyond twice this it is none, and between them it is left out.
+        /// Largest distance of a segment's centre from an annotated leg at which it is labelled as
+        /// a leg, m; beyond twice this distance it is labelled as no leg, and in between it is left
+        /// out.
         #[schemars(range(min = 0.01, max = 1.0))]
         pub label_m: f64 = 0.15,
     }

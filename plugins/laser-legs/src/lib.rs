@@ -1,13 +1,14 @@
-//! Detector of people by their legs in a laser scan (K. Arras, O. Mozos, W. Burgard, *Using boosted
+//! Detects people by their legs in a laser scan (K. Arras, O. Mozos, W. Burgard, *Using boosted
 //! features for the detection of people in 2D range data*, ICRA 2007).
 //!
-//! A scan is divided into segments where neighbouring points are farther apart than the rays
-//! explain. Each segment becomes a vector of lengths and shapes in metres ([`features`]), boosted
-//! trees turn that into log-odds ([`Model`]), and legs near each other are paired to a person.
+//! A scan is divided into segments where neighbouring points are farther apart than the spacing of
+//! the rays explains. Each segment becomes a vector of lengths and shapes in metres ([`features`]),
+//! boosted trees turn it into log-odds ([`Model`]), and legs near each other are paired to form a
+//! person.
 //!
-//! The features contain neither the range nor the number of rays, so that one model serves scanners
-//! of any resolution and height at which legs are seen; the trainer also shows it scans with every
-//! second, third or fourth ray only.
+//! The features contain neither the range nor the number of rays, so one model serves scanners of
+//! any resolution, at any height at which legs are visible; the trainer also uses scans with only
+//! every second, third or fourth ray.
 //!
 //! With the feature `train` the crate also fits models (`train`).
 //!

@@ -1,4 +1,4 @@
-//! Scans of the last seconds: was a place free or occupied then?
+//! Scans of the last seconds: whether a position was free or occupied.
 
 use std::collections::VecDeque;
 

@@ -1,8 +1,8 @@
 //! Trainer of a [`Model`] from scans with annotated legs.
 //!
-//! The legs of a scan come first, as candidates at their places; a candidate that is no person
-//! closes the scan, and labels its other segments as clutter. Simulated scans come as whole frames
-//! with the heads in them; they are fitted, and never held out.
+//! The legs of a scan come first, as candidates at their positions; a candidate that is no person
+//! ends the scan, and its other segments are labelled as clutter. Simulated scans come as whole
+//! frames with the heads in them; they are used for fitting and never held out.
 
 use std::collections::BTreeMap;
 

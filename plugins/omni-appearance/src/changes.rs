@@ -1,4 +1,4 @@
-//! Changes since a previous image, with a robot that moved between the two.
+//! Changes since a previous image, compensated for the motion of the robot.
 
 use std::collections::VecDeque;
 

@@ -1,4 +1,4 @@
-//! Columns of a panorama that closes on itself.
+//! Columns of a panorama that wraps around.
 
 /// A run of columns: the first, from 0 up to the width, and their number. It continues beyond the
 /// last column at the first one.

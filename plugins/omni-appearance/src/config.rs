@@ -48,68 +48,69 @@ settings! {
         /// Name of the person in the model with the fit to use; `general` for the fit to
         /// all people, `nearest` for the person with the closest appearance.
         pub person: String = "general".into(),
-        /// Images of the empty scene from which the background is made; there are no detections
-        /// before.
+        /// Number of images of the empty scene from which the background is computed; there are no
+        /// detections before.
         #[schemars(range(min = 1, max = 10000))]
         pub background_frames: u32 = 24,
-        /// A pixel differs from the background by more than this many standard deviations ...
+        /// Number of standard deviations by which a pixel must differ from the background.
         #[schemars(range(min = 0.0, max = 100.0))]
         pub threshold_sigmas: f64 = 4.0,
-        /// ... and by more than this, grey levels.
+        /// Number of grey levels by which it must differ as well.
         pub threshold_floor: u8 = 6,
-        /// Time constant with which the background follows a change, s; 0 keeps it as it is.
+        /// Time constant with which the background adapts to a change, s; 0: it never adapts.
         #[schemars(range(min = 0.0, max = 1e6))]
         pub adapt_s: f64 = 20.0,
-        /// Time after which a pixel that differs without a break becomes background, s; 0: never.
+        /// Time after which a pixel that differs without interruption becomes background, s; 0:
+        /// never.
         #[schemars(range(min = 0.0, max = 1e6))]
         pub absorb_s: f64 = 60.0,
-        /// A pixel of which the colours are darker on average, but not below this part of the
-        /// background, may be shadow; 1 finds no shadow.
+        /// Least fraction of the background's colours, on average, at which a darker pixel may be
+        /// shadow; 1: no shadows are found.
         #[schemars(range(min = 0.0, max = 1.0))]
         pub shadow_min: f64 = 0.6,
-        /// Upper limit of that part.
+        /// Largest fraction of the background's colours at which a pixel may be shadow.
         #[schemars(range(min = 0.0, max = 1.0))]
         pub shadow_max: f64 = 0.97,
-        /// Largest difference between the three colours' parts in a shadow.
+        /// Largest difference between these fractions of the three colours in a shadow.
         #[schemars(range(min = 0.0, max = 1.0))]
         pub shadow_tint: f64 = 0.05,
-        /// Fewest pixels in a column of a person; more if columns of the empty scene had more.
+        /// Least number of pixels in a column of a person; more if columns of the empty scene had
+        /// more.
         #[schemars(range(min = 1, max = 1000))]
         pub column_pixels: u16 = 4,
         /// Widest gap, in columns, that does not divide a person.
         #[schemars(range(max = 100))]
         pub bridge_columns: usize = 4,
-        /// Fewest pixels of a person.
+        /// Least number of pixels of a person.
         pub min_pixels: u32 = 60,
-        /// A run is divided where its columns fall below this part of the lower of the two peaks
-        /// beside; 0 divides none.
+        /// A run is divided where its columns fall below this fraction of the lower of the two
+        /// neighbouring peaks; 0: never.
         #[schemars(range(min = 0.0, max = 0.999))]
         pub valley: f64 = 0.5,
-        /// Most people in an image; the largest are kept.
+        /// Largest number of people in an image; the largest ones are kept.
         #[schemars(range(min = 1, max = 100))]
         pub max_people: usize = 8,
         /// Lowest and highest head that is accepted, m.
         #[schemars(inner(range(min = -0.999, max = 3.999)))]
         pub head_height_m: [f64; 2] = [0.9, 2.2],
-        /// Standard deviation of the bearing, degrees, ...
+        /// Standard deviation of the bearing, degrees.
         #[schemars(range(min = 0.01, max = 90.0))]
         pub sigma_bearing_deg: f64 = 0.4,
-        /// ... and of the visible body about its middle, m: arms and legs swing.
+        /// Standard deviation of the visible body about its centre, m: arms and legs swing.
         #[schemars(range(min = 0.0, max = 1.0))]
         pub sigma_aside_m: f64 = 0.035,
         /// Standard deviation of the height of the head, m.
         #[schemars(range(min = 0.001, max = 10.0))]
         pub sigma_height_m: f64 = 0.12,
-        /// Walls and furniture are assumed at one of these distances, whichever fits best, when the
-        /// background is moved with the robot, m.
+        /// Distances of walls and furniture, m: when the background is moved with the robot, the
+        /// distance that fits best is assumed.
         #[schemars(length(min = 1, max = 16), inner(range(min = 0.5, max = 1000.0)))]
         pub walls_m: Vec<f64> = vec![1.2, 2.0, 3.5, 6.0],
         /// Uncertainty of the background after the robot has moved, columns and rows.
         #[schemars(inner(range(max = 20)))]
         pub slack_px: [usize; 2] = [3, 2],
-        /// Once the robot has moved, at least this part of a person's pixels differs from the
-        /// previous image, which is moved like the background and at least 0.2 s old; 0 asks for
-        /// none.
+        /// Least share of a person's pixels that differ from the previous image once the robot has
+        /// moved; that image is moved like the background and at least 0.2 s old. 0: not required.
         #[schemars(range(min = 0.0, max = 1.0))]
         pub changed_part: f64 = 0.3,
         /// Step after the measurement of a person: of a program, not of a file.

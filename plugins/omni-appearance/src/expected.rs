@@ -1,4 +1,4 @@
-//! Image columns in which known people are expected: they separate two people that are seen as one
+//! Image columns in which known people are expected: they separate two people that appear as one
 //! run of columns.
 
 use nalgebra::{Isometry2, Point3};

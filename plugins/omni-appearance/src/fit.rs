@@ -1,15 +1,15 @@
-//! Fits networks by the method of Levenberg and Marquardt: the normal equations of all samples,
-//! damped as far as is needed for the cost to fall.
+//! Fits networks by the Levenberg-Marquardt method: the normal equations of all samples, damped as
+//! far as necessary for the cost to fall.
 //!
-//! P5 takes steps along the gradient. Its networks have a few dozen weights and a few hundred
-//! samples; there the second order costs nothing, needs no rate, and converges. The cost is the sum
-//! of the squared errors and, weighted by `decay`, of the squared weights: without these the
-//! network follows single samples.
+//! P5 uses gradient descent. Its networks have a few dozen weights and a few hundred samples, for
+//! which a second-order method costs little, needs no learning rate, and converges. The cost is the
+//! sum of the squared errors and, weighted by `decay`, of the squared weights: without these the
+//! network overfits single samples.
 //!
-//! The steps of the paper are there for comparison. It prints their rate, 0.3, but not the scaling
-//! of inputs and target, nor the end of the training. Both are scaled to mean 0 and deviation 1,
-//! because on pixels and metres such steps overshoot at once; each step goes along the mean
-//! gradient of all samples, and all steps are taken.
+//! The gradient descent of the paper is available for comparison. The paper states its learning
+//! rate, 0.3, but neither the scaling of inputs and target nor the end of the training. Both are
+//! scaled to mean 0 and standard deviation 1, because on pixels and metres such steps overshoot at
+//! once; each step follows the mean gradient of all samples, and all steps are taken.
 
 use nalgebra::{DMatrix, DVector};
 use tagalong_learn::dense::{NormalEquations, transposed_product};

@@ -1,15 +1,15 @@
 //! Person detector for the panorama of a conical mirror (P5, section 4).
 //!
 //! Pixels that differ from the background are counted by column and by row. A run of columns is a
-//! person: its mean gives the bearing, and a few features, above all width, lower edge and area,
-//! give the distance by a learned model ([`Model`]). The panorama closes on itself, so columns are
-//! counted modulo its width throughout: in runs, means and extents ([`circular`]).
+//! person: its mean gives the bearing, and a few features, mainly width, lower edge and area, give
+//! the distance with a learned model ([`Model`]). The panorama wraps around, so columns are counted
+//! modulo its width throughout: in runs, means and extents ([`circular`]).
 //!
-//! A shadow differs from the background, too, and spoils the lower edge. It darkens all colours
-//! alike, so pixels that do only that are left out.
+//! A shadow also differs from the background, and displaces the lower edge. It darkens all colours
+//! alike, so pixels that are only darker are left out.
 //!
 //! While the robot moves, the background moves with it: the floor by the odometry, everything else
-//! as if it stood at one of a few fixed distances.
+//! as if it were at one of a few fixed distances.
 //!
 //! With the feature `train` the crate also fits models (`train`).
 

@@ -1,4 +1,4 @@
-//! Fits the distance model to people at known places.
+//! Fits the distance model to people at known positions.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -23,51 +23,51 @@ settings! {
     /// Settings of `onnx`.
     pub struct Config {
         /// ONNX file, relative to the config, or the name of an installed network
-        /// (`tagalong model --install`). Empty: no one is found, and the funnel says so.
+        /// (`tagalong model --install`). Empty: no person is found, and the funnel says so.
         pub model: String,
         /// Family of the network: `auto` (by the file), `yolox`, `yolov8`, `yolov10`, `rt-detr`,
         /// `rf-detr`, `nanodet`, `nanodet-m`, `rtmdet` or `movenet`.
         pub family: OrAuto<Family> = OrAuto::Auto,
-        /// Columns and rows of the input where the file leaves them open, for example `[640, 640]`,
-        /// which is also taken for an empty list (256 x 256 for `movenet`).
+        /// Columns and rows of the input if the file leaves them open, for example `[640, 640]`,
+        /// which is also the meaning of an empty list (256 x 256 for `movenet`).
         pub size: Vec<usize>,
-        /// Classes of people; empty: those that the file calls person, pedestrian or people, and
-        /// without names that of the family (0, and 1 for `rf-detr`).
+        /// Classes of people; empty: those that the file calls person, pedestrian or people, or, if
+        /// it has no names, those of the family (0, and 1 for `rf-detr`).
         pub classes: Vec<usize>,
         /// Unit of the boxes: `auto` (by the outputs), `pixels` of the input or `fractions` of its
         /// sides; for `yolox`, `yolov8`, `yolov10`, `rt-detr` and `rtmdet`.
         pub box_unit: OrAuto<BoxUnit> = OrAuto::Auto,
-        /// Order of the corners of a list of boxes: `auto` (`xyxy`, and refused if nearly all boxes
-        /// of people are wide), `xyxy` or `yxyx`; for `yolov10`.
+        /// Order of the corners in a list of boxes, for `yolov10`: `xyxy`, `yxyx` or `auto`
+        /// (`xyxy`, which is refused if nearly all boxes of people are wide).
         pub box_order: OrAuto<BoxOrder> = OrAuto::Auto,
-        /// Probability from which a box is a new person; -1: that of the family. Below a half,
-        /// scores are log-odds above it, so that it also is what `start_score = 0.0` of a track
-        /// manager means.
+        /// Probability from which a box is a new person; -1: that of the family. If it is below a
+        /// half, scores are log-odds relative to it, so that it is also the meaning of
+        /// `start_score = 0.0` of a track manager.
         #[schemars(range(min = -1.0, max = 1.0))]
         pub discover_score: f64 = BY_FAMILY,
-        /// Probability from which a box near a confirmed track is its person; -1: 0.4 times
+        /// Probability from which a box near a confirmed track belongs to it; -1: 0.4 times
         /// `discover_score`.
         #[schemars(range(min = -1.0, max = 1.0))]
         pub track_score: f64 = BY_FAMILY,
-        /// Of two boxes that overlap by more than this (IoU) the less likely one is dropped; only
-        /// for families that leave it open (`yolox`, `yolov8`, `nanodet`, `nanodet-m`).
+        /// Overlap (IoU) of two boxes above which the less likely one is dropped; only for families
+        /// that do not do this themselves (`yolox`, `yolov8`, `nanodet`, `nanodet-m`).
         #[schemars(range(min = 0.0, max = 1.0))]
         pub suppress_iou: f64 = 0.6,
         /// Order of the channels: `auto` (that of the family), `rgb` or `bgr`.
         pub colours: OrAuto<Colours> = OrAuto::Auto,
-        /// Place of the image in the input: `auto` (that of the family), `stretch`, `centre` or
+        /// Placement of the image in the input: `auto` (that of the family), `stretch`, `centre` or
         /// `top-left`, the latter two with the aspect ratio of the image.
         pub fit: OrAuto<Fit> = OrAuto::Auto,
         /// Value of padded pixels, 0 to 255; -1: that of the family.
         #[schemars(range(min = -1.0, max = 255.0))]
         pub padding: f64 = -1.0,
-        /// Three means in the order of the channels, 0 to 255, which are subtracted from pixels;
-        /// empty: those of the family.
+        /// Three means in the order of the channels, 0 to 255, which are subtracted from the
+        /// pixels; empty: those of the family.
         pub mean: Vec<f32>,
-        /// Three deviations in the order of the channels, by which they are divided; empty: those
-        /// of the family.
+        /// Three standard deviations in the order of the channels, by which the pixels are divided;
+        /// empty: those of the family.
         pub deviation: Vec<f32>,
-        /// Boxes to detections with a position.
+        /// Conversion of boxes to detections with a position.
         #[serde(flatten)]
         pub boxes: BoxSettings,
         /// Limits of the network.

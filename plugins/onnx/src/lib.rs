@@ -1,8 +1,8 @@
-//! `onnx`: people by a neural network that the user brings as an ONNX file.
+//! `onnx`: finds people with a neural network that the user provides as an ONNX file.
 //!
 //! The network runs through [`tagalong_network::PersonNetwork`], which knows the conventions of
-//! nine families of detectors. Its boxes of whole people become upper-body squares with a place:
-//! by depth where that shows the face, otherwise by the size of the box.
+//! nine families of detectors. Its boxes of whole people become upper-body squares with a position:
+//! from depth if it shows the face, otherwise from the size of the box.
 //!
 //! ```
 //! use tagalong_conformance::{context, patch};

@@ -1,4 +1,4 @@
-//! Reader of `det.txt` of the MOTChallenge.
+//! Reader of MOTChallenge's `det.txt`.
 
 use std::collections::BTreeMap;
 use std::path::Path;

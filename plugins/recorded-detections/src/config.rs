@@ -17,26 +17,26 @@ pub enum ScoreScale {
 settings! {
     /// Settings of `recorded-detections`.
     pub struct Config {
-        /// A `det.txt` of the MOTChallenge (frame, -1, x, y, width, height, score; frames from 1,
-        /// pixels), relative to the config; for `run` and `bench` `{log}` in it is the name of the log
-        /// without its ending. Empty: the log topic that `[input] detections_topic` names.
+        /// A MOTChallenge `det.txt` (frame, -1, x, y, width, height, score; frames from 1, pixels),
+        /// relative to the config; for `run` and `bench`, `{log}` in it is the name of the log
+        /// without its extension. Empty: the log topic that `[input] detections_topic` names.
         pub path: String,
-        /// Boxes with a lower score, on the recorded scale, are dropped.
+        /// Least score of a box, on the recorded scale; boxes with less are dropped.
         pub min_score: f64 = 0.3,
-        /// Score, on the recorded scale, from which a box may be a new person; less certain ones
-        /// continue tracks alone. Scores of detections are log-odds above it. By default
-        /// `min_score`, or even odds (a probability of a half) where that is less.
+        /// Score, on the recorded scale, from which a box may be a new person; boxes with less only
+        /// continue tracks. Scores of detections are log-odds relative to it. By default
+        /// `min_score`, or even odds (a probability of a half) if that is less.
         pub discover_score: Option<f64>,
         /// Meaning of the score.
         pub score: ScoreScale = ScoreScale::Probability,
-        /// Boxes to detections with a position.
+        /// Conversion of boxes to detections with a position.
         #[serde(flatten)]
         pub boxes: BoxSettings,
         /// Standard deviation of a recorded position in space, m.
         #[schemars(range(min = 1e-6, max = 1e6))]
         pub sigma_position_m: f64 = 0.15,
-        /// Keep recorded places that are outside of the image, without a box: those of a detector
-        /// that sees more than the camera.
+        /// Keeps recorded positions outside of the image, without a box, for a detector that sees
+        /// more than the camera.
         pub outside_image: bool = false,
     }
 }

@@ -1,10 +1,10 @@
-//! Replays the detections of another detector: any detector can serve in a pipeline by running
-//! elsewhere and recording its output.
+//! Replays the detections of another detector: any detector can be used in a pipeline if it runs
+//! elsewhere and its output is recorded.
 //!
 //! Boxes come from a text file or from a topic of the log; positions come from the depth image,
 //! from the recording, or from the size of the box with a correspondingly large uncertainty. No
-//! colour image is read, so that every tracker gets exactly the same detections, as tracking
-//! benchmarks with given ("public") detections require.
+//! colour image is read, so every tracker gets exactly the same detections, as tracking benchmarks
+//! with given ("public") detections require.
 //!
 //! ```
 //! use tagalong_conformance::{context, patch};

@@ -7,18 +7,18 @@ use tagalong_core::settings;
 #[serde(rename_all = "kebab-case")]
 pub enum Scaling {
     /// The mean is subtracted, then the vector is scaled to length 1: the squared distance of two
-    /// patches is twice one minus their correlation.
+    /// patches is twice the difference of 1 and their correlation.
     #[default]
     Unit,
     /// Histograms of gradient directions replace the grey values (Dalal and Triggs, CVPR 2005): 5x5
     /// cells of 16 signed directions, each divided by the gradient strength around it; then the
     /// vector is scaled to length 1.
     Gradients,
-    /// Grey values are divided by 255, so that they are 0 to 1. With a gamma of 8 nearly all
-    /// patches are far from each other.
+    /// Grey values are divided by 255, so that they lie between 0 and 1. With a gamma of 8 nearly
+    /// all patches are far from each other.
     Fraction,
-    /// No normalisation; grey values are 0 to 255. With a gamma of 8 every
-    /// patch is practically infinitely far from every other.
+    /// No normalisation; grey values lie between 0 and 255. With a gamma of 8 every patch is
+    /// practically infinitely far from every other.
     Raw,
 }
 
@@ -29,7 +29,7 @@ settings! {
         pub model: String,
         /// Weight of this verifier's log-odds relative to the detector's score.
         pub weight: f64 = 1.0,
-        /// Log-odds of one frame are limited to plus and minus this: a single patch never decides
+        /// Bound on the log-odds of one frame, in both directions: a single patch never decides
         /// alone.
         pub limit: f64 = 6.0,
         /// Settings of the fit; only `tagalong train` reads them.
@@ -51,15 +51,15 @@ settings! {
         pub penalties: Vec<f64> = vec![0.3, 1.0, 3.0, 10.0],
         /// Number of parts into which the groups are divided; each is held out once.
         pub folds: usize = 4,
-        /// Most examples in the cross-validation.
+        /// Largest number of examples in the cross-validation.
         pub max_tried: usize = 1000,
-        /// Most examples in the final fit; memory grows with the square.
+        /// Largest number of examples in the final fit; memory grows with its square.
         pub max_samples: usize = 4000,
-        /// Most support vectors in the model file; each takes half a kilobyte.
+        /// Largest number of support vectors in the model file; each takes half a kilobyte.
         pub max_vectors: usize = 1200,
-        /// Most examples of people, sampled at random; 0: all.
+        /// Largest number of examples of people, sampled at random; 0: all.
         pub people: usize = 0,
-        /// Most examples of other objects, sampled at random; 0: all.
+        /// Largest number of examples of other objects, sampled at random; 0: all.
         pub others: usize = 0,
     }
 }

@@ -1,13 +1,13 @@
-//! Verifies candidates by their intensity patch, with a support vector machine (P4, section II-C).
+//! Verifies candidates by their grey values, with a support vector machine (P4, section II-C).
 //!
-//! Silhouettes in depth cannot tell a person from a coat on a stand; the grey values inside often
-//! can. A candidate's square is reduced to 20x20 grey values ([`Sampler`]), which are normalised
-//! for brightness and contrast or replaced by gradient directions, and compared with the support
-//! vectors of a [`Model`] by a radial basis function. The decision value becomes log-odds by a
-//! calibration on held-out groups.
+//! A silhouette in depth cannot distinguish a person from a coat on a stand; the grey values inside
+//! it often can. A candidate's square is reduced to 20x20 grey values ([`Sampler`]), which are
+//! normalised for brightness and contrast or replaced by gradient directions, and compared with the
+//! support vectors of a [`Model`] by a radial basis function. A calibration on held-out groups
+//! turns the decision value into log-odds.
 //!
-//! The log-odds assume even priors: the prior, one person in many candidates, belongs to the score
-//! of the detector, which the pipeline adds.
+//! The log-odds assume an even prior: the actual prior, one person in many candidates, is part of
+//! the detector's score, which the pipeline adds.
 //!
 //! With the feature `train` the plugin also offers a trainer (`train`). Without it no solver is
 //! compiled in.

@@ -1,5 +1,5 @@
-//! The track managers, each in a module of its name: they decide when a track starts, counts as a
-//! person, and ends.
+//! The track managers, each in a module named after it: they decide when a track starts, is
+//! confirmed, and ends.
 //!
 //! ```
 //! use tagalong_conformance::samples::detection_at;

@@ -1,4 +1,4 @@
-//! State of a depth camera, the one of the frames or a further one.
+//! State of a depth camera: the camera of the frames, or a further source.
 
 use std::sync::Arc;
 

@@ -1,22 +1,22 @@
-//! Collision monitor: limits of the motion by the sensors of obstacles.
+//! Collision monitor: limits the motion of the robot by what the obstacle sensors see.
 //!
-//! It gathers obstacles and people, from the depth image, the laser scan and
-//! further sources, checks that these sensors see anything, and that they are not frozen, and returns
-//! the largest speed on a path that the robot is about to take.
+//! It collects obstacles and people from the depth image, the laser scan and further sources,
+//! checks that these sensors deliver readings and are not frozen, and returns the largest speed on
+//! a path that the robot is about to take.
 //!
 //! | module | content |
 //! |---|---|
 //! | `footprint` | outline of the robot, and the paths that it takes |
-//! | `depth_state`, `source_state` | state of a depth camera, of a scanner and of a range sensor |
+//! | `depth_state`, `source_state` | state of a depth camera, a scanner and a range sensor |
 //! | `further_source` | a source of the settings, by its kind |
 //! | `freshness` | which reading is new, and how old the newest one is |
-//! | `obstacle_memory` | things in the depth image, and those that left it |
+//! | `obstacle_memory` | obstacles in the depth image, and those that have left it |
 //! | `pixel_rays` | viewing rays of the pixels of a depth camera |
-//! | `space` | places that were seen free: a thing that appears there moves |
-//! | `sweep` | speed on a path before things and beside people |
+//! | `space` | space that was seen free: an object that appears there is moving |
+//! | `sweep` | speed on a path, limited by obstacles and people |
 //! | `coverage` | share of valid readings in the swept region: unknown is not free |
 //! | `zones` | stop and slowdown polygons |
-//! | `watchdog` | sensors that repeat themselves or contradict the odometry |
+//! | `watchdog` | sensors that repeat their data or contradict the odometry |
 
 mod binned;
 mod coverage;

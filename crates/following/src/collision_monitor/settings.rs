@@ -7,45 +7,45 @@ use crate::command_limiter::at_least;
 use crate::{CommandLimiterSettings, RobotSettings};
 
 settings! {
-    /// Obstacles and people before which the robot slows down and stops.
+    /// Obstacles and people for which the robot slows down and stops.
     #[non_exhaustive]
     pub struct CollisionMonitorSettings {
-        /// Sensors of obstacles: "sensed" (depth or laser; without them, or when one of them falls
-        /// silent, nothing moves), or "none" for a controller that is to drive without eyes for
-        /// obstacles.
+        /// Obstacle sensors: "sensed" (depth or laser; the robot does not move without them, or
+        /// when one of them falls silent), or "none" for a controller that may drive without
+        /// obstacle sensors.
         pub obstacles: ObstacleSource = ObstacleSource::Sensed,
-        /// Clearance beside the footprint, m: a thing that is nearer to the swept area is in the
-        /// way.
+        /// Clearance beside the footprint, m: an obstacle nearer than this to the swept area is in
+        /// the way.
         #[schemars(range(min = 0.0, max = 1.0))]
         pub side_m: f64 = 0.09,
-        /// Distance of the footprint from an obstacle at which the robot stops before it, m.
+        /// Distance from the footprint to an obstacle at which the robot stops, m.
         #[schemars(range(min = 0.15, max = 2.0))]
         pub stop_m: f64 = 0.35,
-        /// Stop polygon: corners `[x, y]` in the robot frame, m. While `min_points` readings are
-        /// inside, the robot neither drives nor turns. Left out, there is none.
+        /// Stop polygon: corners `[x, y]` in the robot frame, m. While it contains `min_points`
+        /// readings, the robot neither drives nor turns. If left out, there is none.
         pub stop: Vec<[f64; 2]>,
-        /// Slowdown polygon, in the same form: while `min_points` readings are inside, the robot
+        /// Slowdown polygon, in the same form: while it contains `min_points` readings, the robot
         /// drives and turns at `slowdown_ratio` of its speed.
         pub slowdown: Vec<[f64; 2]>,
-        /// Factor of the speed while something is inside `slowdown`.
+        /// Factor on the speed while `slowdown` contains readings.
         #[schemars(range(min = 0.05, max = 1.0))]
         pub slowdown_ratio: f64 = 0.5,
-        /// Keeps away from people, and from things that move, so far that the robot stands before
+        /// Keeps so much distance from people and moving objects that the robot has stopped before
         /// they can reach it; see `people_mps`.
         pub separation: bool = true,
         /// Speed of an approaching person, m/s (1.6 in ISO 13855).
         #[schemars(range(min = 0.5, max = 2.5))]
         pub people_mps: f64 = 1.6,
-        /// Acceleration with which a person may begin to come nearer, m/s².
+        /// Acceleration with which a person may start to approach, m/s².
         #[schemars(range(min = 0.5, max = 10.0))]
         pub people_accel_mps2: f64 = 2.0,
-        /// Distance that is left between the footprint and a person when the robot stands, m.
+        /// Distance that remains between the footprint and a person when the robot has stopped, m.
         #[schemars(range(min = 0.05, max = 2.0))]
         pub protective_m: f64 = 0.2,
-        /// Distance of the footprint from the followed person at which the robot stops, m.
+        /// Distance from the footprint to the followed person at which the robot stops, m.
         #[schemars(range(min = 0.1, max = 2.0))]
         pub followed_stop_m: f64 = 0.3,
-        /// Distance beyond which people and things that move are ignored, m.
+        /// Distance beyond which people and moving objects are ignored, m.
         #[schemars(range(min = 1.0, max = 10.0))]
         pub people_range_m: f64 = 5.0,
         /// Distance beyond which obstacles are ignored, m.
@@ -55,67 +55,67 @@ settings! {
         /// distance.
         #[schemars(range(min = 0.02, max = 0.2))]
         pub floor_m: f64 = 0.08,
-        /// Depth below the floor from which on there is a fall (a stair, a kerb), m; it grows by 3
-        /// cm for each metre of distance.
+        /// Depth below the floor from which a point counts as a drop (a stair, a kerb), m; it grows
+        /// by 3 cm for each metre of distance.
         #[schemars(range(min = 0.04, max = 0.3))]
         pub drop_m: f64 = 0.08,
-        /// Height above which points are ignored because the robot passes below, m.
+        /// Height above which points are ignored, because the robot passes below them, m.
         #[schemars(range(min = 0.3, max = 3.0))]
         pub top_m: f64 = 1.5,
-        /// Radius around the target within which points belong to it, m.
+        /// Radius around the target within which points belong to the target, m.
         #[schemars(range(min = 0.0, max = 0.8))]
         pub target_radius_m: f64 = 0.45,
-        /// Number of points that make an obstacle, in a grid of 160 columns over the image.
+        /// Least number of points of an obstacle, in a grid of 160 columns over the image.
         #[schemars(range(min = 1, max = 100))]
         pub min_points: u32 = 6,
-        /// Part of the image with depth below which the camera counts as blind.
+        /// Share of the image with depth below which the camera counts as blind.
         #[schemars(range(min = 0.005, max = 1.0))]
         pub min_seen: f64 = 0.02,
-        /// Least share of valid readings of a sensor in the part of the swept region that it sees;
-        /// the robot is slower below twice this share, and stands below it.
+        /// Least share of valid readings in the part of the swept region that a sensor sees; the
+        /// robot drives more slowly below twice this share, and stops below it.
         #[schemars(range(min = 0.0, max = 1.0))]
         pub min_share: f64 = 0.3,
-        /// Meaning of a laser ray from which nothing came back: "unknown" unless a camera sees the
-        /// same region, or "free" for a scanner that misses nothing within its range, alone in
-        /// rooms that are larger than that.
+        /// Meaning of a laser ray without a return: "unknown" unless a camera sees the same region,
+        /// or "free" for a scanner that misses nothing within its range, used alone in rooms larger
+        /// than its range.
         pub no_return: NoReturn = NoReturn::Unknown,
-        /// Number of new depth images or scans in a row that repeat the one before, after which the
-        /// sensor counts as frozen: real ones have noise. One that comes with several frames is new
-        /// once.
+        /// Number of consecutive new depth images or scans that equal the one before, after which
+        /// the sensor counts as frozen, because real sensors have noise. An image or scan that is
+        /// in several frames is new once.
         #[schemars(range(min = 2, max = 100))]
         pub identical_frames: u32 = 4,
-        /// The sensors are simulated without noise: equal images are not taken to be frozen.
+        /// The sensors are simulated without noise: equal images do not count as frozen.
         pub noiseless: bool = false,
-        /// Time for which an obstacle is remembered that left the view beside the robot or below
-        /// the image, s.
+        /// Time for which an obstacle is remembered after it left the view, beside the robot or
+        /// below the image, s.
         #[schemars(range(min = 1.0, max = 600.0))]
         pub memory_s: f64 = 20.0,
-        /// Further sources of obstacles: laser scanners, depth cameras, range sensors and bumpers.
+        /// Further obstacle sources: laser scanners, depth cameras, range sensors and bumpers.
         pub sources: Vec<SourceSettings>,
     }
 }
 
-/// Meaning of a laser ray without a reflection.
+/// Meaning of a laser ray without a return.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum NoReturn {
-    /// Nothing is known: a dark or shiny surface reflects nothing either.
+    /// Unknown: dark and shiny surfaces return nothing either.
     #[default]
     Unknown,
-    /// Nothing is there.
+    /// Free.
     Free,
 }
 
-/// Sensors of obstacles that a controller has.
+/// Obstacle sensors that a controller requires.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum ObstacleSource {
-    /// Depth or laser. Without them nothing moves.
+    /// Depth or laser. The robot does not move without them.
     #[default]
     Sensed,
-    /// The robot moves without sensors of obstacles.
+    /// The robot moves without obstacle sensors.
     None,
 }
 

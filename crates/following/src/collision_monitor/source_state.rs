@@ -1,4 +1,4 @@
-//! State of the sensors of obstacles beside the depth image.
+//! State of the obstacle sensors other than the depth image.
 
 use nalgebra::{Point2, Point3, Vector3};
 use tagalong_core::{EgoMotion, LaserScan, RangeReading, RayReading, Track};

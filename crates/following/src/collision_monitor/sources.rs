@@ -3,26 +3,26 @@ use serde::{Deserialize, Serialize};
 use tagalong_core::{Error, Result, settings};
 
 settings! {
-    /// Further source of obstacles: a `[[collision_monitor.sources]]` section, as an entry of
+    /// Further source of obstacles: a `[[collision_monitor.sources]]` section, like an entry of
     /// `observation_sources` of Nav2's collision monitor. The depth image and the laser scan of the
     /// frames are sources without a section.
     #[non_exhaustive]
     pub struct SourceSettings {
-        /// Name of the source in reports; each has its own.
+        /// Name of the source in reports; it must be unique.
         pub name: String,
         /// Kind of the sensor: "scan", "depth", "range" (sonar, infrared) or "bumper".
         #[serde(rename = "type")]
         pub kind: SourceKind = SourceKind::Scan,
-        /// Topic of its messages. Left out, only programs that fill the frames themselves deliver
-        /// it.
+        /// Topic of its messages. If left out, only programs that fill the frames themselves
+        /// deliver its readings.
         pub topic: String,
-        /// Topic of the calibration of a depth camera; left out, it is found beside `topic`.
+        /// Topic of the calibration of a depth camera; if left out, the one found beside `topic`.
         pub info_topic: String,
-        /// Pose of the sensor in the robot frame: x, y, z in m, roll, pitch, yaw in degrees; it
-        /// looks along its x axis, a camera too. Left out, that of tf.
+        /// Pose of the sensor in the robot frame: x, y, z in m, roll, pitch, yaw in degrees. Every
+        /// sensor looks along its x axis, a camera too. If left out, the pose from tf.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub mount: Option<[f64; 6]>,
-        /// Age of its newest reading above which the robot stops, s (Nav2's `source_timeout`).
+        /// Age of the newest reading above which the robot stops, s (Nav2's `source_timeout`).
         #[schemars(range(min = 0.05, max = 5.0))]
         pub source_timeout_s: f64 = 0.5,
         /// Least share of valid readings in the part of the swept region that the source sees;
@@ -43,7 +43,7 @@ pub enum SourceKind {
     Depth,
     /// `sensor_msgs/Range`.
     Range,
-    /// A contact message: `std_msgs/Bool`, or that of a common base.
+    /// A contact message: `std_msgs/Bool`, or the bumper message of a common base.
     Bumper,
 }
 

@@ -1,4 +1,4 @@
-//! Places that one sensor saw free or met something in, to tell moving things from standing ones.
+//! Space that a sensor saw free or occupied, to distinguish moving objects from static ones.
 
 use nalgebra::{Isometry2, Point2};
 use tagalong_core::EgoMotion;

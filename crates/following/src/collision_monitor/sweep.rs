@@ -1,12 +1,13 @@
-//! Speed at which a path is free: the area that the robot sweeps until it stands, against obstacles
-//! that stand still and people that may come nearer meanwhile.
+//! Speed at which a path is free: the area that the robot sweeps until it is at rest, against
+//! static obstacles and against people that may approach meanwhile.
 //!
-//! For a robot of speed v that reacts after t and brakes with a, the way until it stands is
-//! `L = v t + v²/2a` and the time `T = t + v/a`. An obstacle that stands is cleared if the robot stops
-//! before its footprint, swept along the path, comes nearer than the clearance. A person may come
-//! nearer in that time, and until the wheels stand after it, by `reach(T)`; with speed u at once that
-//! is the distance of ISO 13855, `S = (u + v) t + u v/a + v²/2a + C`, where C is `protective_m`. A turn in
-//! place brings the robot nearer to nobody: a person is expected to go on at the speed that they have.
+//! For a robot of speed v that reacts after t and brakes with a, the stopping distance is
+//! `L = v t + v²/2a` and the stopping time `T = t + v/a`. A static obstacle is clear if the robot
+//! stops before its footprint, swept along the path, comes nearer than the clearance. In the
+//! stopping time, and until the wheels are at rest after it, a person may come nearer by
+//! `reach(T)`; with full speed u from the start this is the distance of ISO 13855,
+//! `S = (u + v) t + u v/a + v²/2a + C`, where C is `protective_m`. A turn in place brings the robot
+//! no nearer to a person; the person is expected to keep their present speed.
 
 use nalgebra::Point2;
 use tagalong_core::Reason;

@@ -1,4 +1,5 @@
-//! Watchdog for sensors that repeat themselves, or that do not change as the odometry says.
+//! Watchdog for sensors that repeat their data, or whose data do not change as the odometry
+//! predicts.
 
 use std::sync::Arc;
 

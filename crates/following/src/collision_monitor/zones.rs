@@ -1,4 +1,4 @@
-//! Stop and slowdown polygons around the robot, as those of Nav2's collision monitor.
+//! Stop and slowdown polygons around the robot, like those of Nav2's collision monitor.
 
 use nalgebra::Point2;
 use tagalong_core::Reason;

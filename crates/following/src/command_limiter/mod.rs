@@ -1,13 +1,13 @@
-//! Limiter of the commands: every command of the controller passes it on the way to the wheels.
+//! Command limiter: every command of the controller passes it on the way to the wheels.
 //!
-//! It does not depend on the source of the wish. It lets the robot move only while frames arrive, a
-//! target is followed or searched for and the path is free; it limits the speed, the turn rate, and the
-//! acceleration and the jerk of both, and keeps the curvature as far as these allow; each command carries its reason and the time until
-//! which it is valid.
+//! It does not depend on the source of the requested command. It lets the robot move only while
+//! frames arrive, a target is followed or searched for, and the path is free. It limits the speed,
+//! the turn rate, and the acceleration and jerk of both, and keeps the curvature as far as these
+//! limits allow. Each command carries its reason and the time until which it is valid.
 //!
-//! Without a target the robot slows down within the limits. Emergencies stop the wheels at once: a
-//! fault, a missing sensor, a pause of the frames, a jump of the clock, an expired command, an
-//! obstacle nearer than the robot can stop.
+//! Without a target the robot slows down within the limits. An emergency stops the wheels at once:
+//! a fault, a missing sensor, a gap between frames, a jump of the clock, an expired command, or an
+//! obstacle nearer than the stopping distance.
 
 mod ramp;
 mod response;

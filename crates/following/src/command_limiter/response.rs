@@ -1,12 +1,14 @@
-//! Comparison of the commands with the odometry: does the base do what it is commanded, and how late?
+//! Comparison of the commands with the odometry: whether the base obeys, and with which latency.
 //!
-//! The latency of the base is the delay by which the commands of the last seconds resemble its motion
-//! most, as far as they changed. A motion that lies between the slowest and the fastest command that
-//! were in force within the longest delay is explained; one that is not for some time is not the one
-//! that was commanded: wheels that are stuck or slip, a base that does not stop, or another driver.
+//! The latency of the base is the delay at which its motion is most similar to the commands of the
+//! last seconds, if these changed enough. A motion is explained if it lies between the slowest and
+//! the fastest command that were in force within the longest delay. A motion that is not explained
+//! for some time is not the commanded one: the wheels are stuck or slip, the base does not stop, or
+//! something else drives it.
 //!
-//! Slow commands are within the tolerance of that comparison. Odometry that stands still altogether
-//! through commands to move, however slow, is a fault, too: it repeats itself, or the wheels are stuck.
+//! Slow commands are within the tolerance of that comparison. Therefore odometry that does not
+//! change at all during commands to move, however slow, is also a fault: it repeats itself, or the
+//! wheels are stuck.
 
 use std::collections::VecDeque;
 

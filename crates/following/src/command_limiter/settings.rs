@@ -4,15 +4,15 @@ use crate::RobotSettings;
 use crate::collision_monitor::Braking;
 
 settings! {
-    /// Limits on the robot's motion, for any wish of the controller. The figures are those that
-    /// makers and users of mobile robots work with, and each has a ceiling that no config passes;
-    /// this is no safety function in the sense of the standards.
+    /// Limits on the robot's motion, whatever the controller requests. The values are those that
+    /// makers and users of mobile robots work with, and each has a ceiling that no config can
+    /// exceed; this is not a safety function in the sense of the standards.
     #[non_exhaustive]
     pub struct CommandLimiterSettings {
         /// Largest acceleration, m/s².
         #[schemars(range(min = 0.05, max = 1.0))]
         pub max_accel_mps2: f64 = 0.5,
-        /// Largest deceleration, m/s²; only an emergency brakes harder.
+        /// Largest deceleration, m/s²; only an emergency stop brakes harder.
         #[schemars(range(min = 0.2, max = 2.5))]
         pub max_decel_mps2: f64 = 1.0,
         /// Largest turn rate, rad/s.
@@ -21,41 +21,41 @@ settings! {
         /// Largest change of the turn rate, rad/s².
         #[schemars(range(min = 0.5, max = 10.0))]
         pub max_turn_accel_radps2: f64 = 4.0,
-        /// Largest change of the acceleration, m/s³; only an emergency changes it faster.
+        /// Largest change of the acceleration, m/s³; only an emergency stop changes it faster.
         #[schemars(range(min = 1.0, max = 50.0))]
         pub max_jerk_mps3: f64 = 5.0,
-        /// Largest change of the acceleration of the turn, rad/s³.
+        /// Largest change of the angular acceleration, rad/s³.
         #[schemars(range(min = 5.0, max = 500.0))]
         pub max_turn_jerk_radps3: f64 = 40.0,
-        /// The robot may drive backwards, where no camera looks.
+        /// Lets the robot drive backwards, where no camera looks.
         pub reverse: bool = false,
-        /// Delay from an image to wheels that move accordingly, s; part of the stopping distance.
-        /// At least `valid_s`, because the robot drives on for that time when images cease.
+        /// Delay from an image until the wheels respond to it, s; part of the stopping distance. At
+        /// least `valid_s`, because the robot drives on for that time when images stop arriving.
         #[schemars(range(min = 0.1, max = 2.0))]
         pub reaction_s: f64 = 0.5,
-        /// Time from the end of the braking until the wheels stand, s: a person comes nearer
-        /// meanwhile. Bases with a slow motor control take some tenths of a second.
+        /// Time from the end of braking until the wheels are at rest, s; a person may come nearer
+        /// meanwhile. Bases with slow motor control take some tenths of a second.
         #[schemars(range(min = 0.0, max = 1.0))]
         pub settle_s: f64 = 0.25,
-        /// Distance that is left when the robot has stopped, m.
+        /// Distance that remains ahead when the robot has stopped, m.
         #[schemars(range(min = 0.3, max = 2.0))]
         pub margin_m: f64 = 0.3,
         /// Validity of a command, s.
         #[schemars(range(min = 0.05, max = 0.5))]
         pub valid_s: f64 = 0.25,
-        /// Pause between frames after which the speed is halved, s.
+        /// Gap between frames after which the speed is halved, s.
         #[schemars(range(min = 0.05, max = 0.5))]
         pub slow_after_s: f64 = 0.25,
-        /// Pause between frames after which the robot stops, s.
+        /// Gap between frames after which the robot stops, s.
         #[schemars(range(min = 0.1, max = 0.5))]
         pub stop_after_s: f64 = 0.5,
-        /// Largest believable speed of the odometry, m/s; more is a fault until the pipeline is
-        /// armed again.
+        /// Largest plausible speed of the odometry, m/s; a larger one is a fault until the pipeline
+        /// is armed again.
         #[schemars(range(min = 0.1, max = 5.0))]
         pub max_odometry_mps: f64 = 3.0,
-        /// Compares the commands with the odometry while the base executes them: a base that does
-        /// something else, or responds too late, is a fault. Off only where the odometry is not
-        /// that of the base, as in a test with a recorded drive.
+        /// Compares the odometry with the commands while the base executes them: a base that does
+        /// something else, or responds too late, is a fault. Turn it off only if the odometry is
+        /// not that of the base, as in a test with a recorded drive.
         pub check_response: bool = true,
         /// Time for which an enable holds unless it is repeated, s.
         #[schemars(range(min = 0.1, max = 1.0))]

@@ -27,9 +27,9 @@ pub enum ChoiceRule {
     /// The nearest person in front.
     #[default]
     Nearest,
-    /// The person that walks up to the robot and stands still before it.
+    /// The person that walks up to the robot and stops in front of it.
     Approach,
-    /// The nearest person that holds a hand above the head; needs a detector that finds joints.
+    /// The nearest person that raises a hand above the head; needs a detector that finds joints.
     #[serde(rename = "raised-hand")]
     RaisedHand,
     /// No person: the robot waits for an enrollment.

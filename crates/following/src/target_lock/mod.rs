@@ -1,10 +1,11 @@
 //! Target lock: the choice of the person to follow, and their recovery after a loss.
 //!
-//! A track is not a person. Behind another person a track may change over to the wrong one, and a
-//! returning person gets a new number. So the lock remembers the appearance of the person, compares
-//! it with the followed track, and reports its confidence for every frame. It returns to a track
-//! only on evidence in several frames in a row, and only if the person can have got there; never to
-//! one that was seen at the same time as the person, nor to one that stands where such a one stood.
+//! A track is not a person. When people occlude each other a track may switch to the wrong one, and
+//! a returning person gets a new ID. The lock therefore remembers the appearance of the person,
+//! compares it with the followed track, and reports its confidence in every frame. It returns to a
+//! track only on evidence in several consecutive frames, and only if the person can have moved
+//! there. It never returns to a track that was seen at the same time as the person, nor to one at
+//! the position of such a track.
 
 mod chooser;
 mod lock;

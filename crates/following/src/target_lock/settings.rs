@@ -3,50 +3,50 @@ use tagalong_core::{Error, Result, settings};
 use super::ChoiceRule;
 
 settings! {
-    /// Choice of the target, doubts about its identity, and the search for a lost person.
+    /// Choice of the target, doubt about its identity, and the search for a lost person.
     #[non_exhaustive]
     pub struct TargetSettings {
-        /// Number of the track to follow; one that `choose` picks if left out.
+        /// ID of the track to follow; if left out, `choose` picks one.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub track: Option<u32>,
         /// Choice of a person while there is none: "nearest" in front; "approach", the one that
-        /// walks up to the robot and stands still before it; "raised-hand", the one that holds a
-        /// hand above the head, with a detector that finds joints; or "none", to wait for an
+        /// walks up to the robot and stops in front of it; "raised-hand", the one that raises a
+        /// hand above the head, with a detector that finds joints; or "none", which waits for an
         /// enrollment.
         pub choose: ChoiceRule = ChoiceRule::Nearest,
-        /// Largest bearing to either side of a track that may be chosen, degrees.
+        /// Largest bearing of a track that may be chosen, to either side, degrees.
         #[schemars(extend("exclusiveMinimum" = 0))]
         pub choose_within_deg: f64 = 45.0,
         /// Largest distance of a track that may be chosen, m.
         #[schemars(extend("exclusiveMinimum" = 0))]
         pub choose_within_m: f64 = 5.0,
-        /// Time for which there has been such a track before one is chosen, s: the nearest person
-        /// is not always seen first.
+        /// Time for which such a track has to exist before one is chosen, s, because the nearest
+        /// person is not always seen first.
         #[schemars(range(min = 0.0))]
         pub choose_after_s: f64 = 0.0,
-        /// Time after that choice in which somebody nearer, at most 3 m away and within the same
-        /// bearing, is taken instead, s. An enrolled person is kept in any case.
+        /// Time after that choice in which a nearer person, at most 3 m away and within the same
+        /// bearing, replaces the chosen one, s. An enrolled person is kept in any case.
         #[schemars(range(min = 0.0, max = 10.0))]
         pub reconsider_s: f64 = 0.0,
-        /// Distance within which a person that walked up to the robot stands before it, m.
+        /// Distance from the robot within which an approaching person has to stop, m.
         #[schemars(range(min = 0.5, max = 5.0))]
         pub approach_within_m: f64 = 2.0,
-        /// Distance by which that person came nearer, m.
+        /// Distance by which that person has to come nearer, m.
         #[schemars(range(min = 0.1, max = 5.0))]
         pub approach_by_m: f64 = 0.5,
-        /// Time for which that person stands still, s.
+        /// Time for which that person has to stand still, s.
         #[schemars(range(min = 0.2, max = 30.0))]
         pub approach_stands_s: f64 = 1.0,
-        /// Time for which a person holds a hand above the head, s.
+        /// Time for which a person has to hold a hand above the head, s.
         #[schemars(range(min = 0.2, max = 10.0))]
         pub raised_hand_s: f64 = 0.6,
-        /// Remember the person's appearance, doubt a track that looks different, and recognise the
-        /// person again. Without it a track is followed while it lives, and no other after that.
+        /// Remembers the person's appearance, doubts a track that looks different, and recognises
+        /// the person again. Without it a track is followed until it ends, and no other after it.
         pub remember: bool = true,
         /// Number of detections after which the person is known well.
         #[schemars(range(min = 1))]
         pub training_sightings: u32 = 15,
-        /// Weight of one detection in the belief that it is the same person, 0 to 1.
+        /// Weight of one detection in the estimate of whether it is the same person, 0 to 1.
         #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 1))]
         pub belief_weight: f64 = 0.25,
         /// Probability of being the same person below which the track is followed slowly.
@@ -60,13 +60,13 @@ settings! {
         pub doubt_after_s: f64 = 0.5,
         /// Time out of sight after which the target is lost, s.
         pub lose_after_s: f64 = 2.0,
-        /// Accumulated probability from which on a track is recognised as the person, ...
+        /// Probability from which a track counts as the person, accumulated over its detections.
         #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
         pub again_from: f64 = 0.85,
-        /// ... in this many detections in a row.
+        /// Number of consecutive detections in which `again_from` has to be reached.
         #[schemars(range(min = 1))]
         pub again_sightings: u32 = 5,
-        /// Largest speed at which the person can have moved from the last seen position, m/s.
+        /// Largest speed at which the person can have moved from where they were last seen, m/s.
         #[schemars(extend("exclusiveMinimum" = 0))]
         pub reach_mps: f64 = 2.0,
         /// Distance from the person below which another track may be confused with it, m:
@@ -81,33 +81,33 @@ settings! {
 }
 
 settings! {
-    /// Log-odds that two detections are of one person: the sum, over the kinds of difference, of a
+    /// Log-odds that two detections show one person: the sum, over the kinds of difference, of a
     /// weight times the amount by which the difference is below its neutral value. Hellinger
-    /// distances lie between 0, the same, and 1. The numbers are those that `tagalong follow
-    /// configs/follow-depth.toml --split train --seeds 4 --fit` prints, a logistic regression over
-    /// 60 rides; every `tagalong follow` prints the calibration of the probabilities.
+    /// distances lie between 0 (equal) and 1. The values are those that `tagalong follow
+    /// configs/follow-depth.toml --split train --seeds 4 --fit` prints: a logistic regression over
+    /// 60 rides. Every `tagalong follow` prints the calibration of the probabilities.
     pub struct LooksSettings {
-        /// Colours of the upper body: the neutral Hellinger distance, and the weight of one below
+        /// Colours of the upper body: the neutral Hellinger distance, and the weight per unit below
         /// it.
         pub torso: [f64; 2] = [0.166, 12.566],
         /// Colours of the legs, likewise.
         pub legs: [f64; 2] = [0.472, 4.394],
         /// Directions of edges on the upper body, likewise.
         pub texture: [f64; 2] = [0.267, 7.819],
-        /// Vectors of the network of `[appearance]`, which take the place of the three above: the
-        /// neutral distance (1 minus the cosine), and the weight of one below it. Not fitted,
-        /// because no network is shipped: fit it to yours with `tagalong follow --fit`.
+        /// Embeddings of the network of `[appearance]`, which replace the three above: the neutral
+        /// distance (1 minus the cosine), and the weight per unit below it. Not fitted, because no
+        /// network is shipped: fit it to yours with `tagalong follow --fit`.
         pub vector: [f64; 2] = [0.35, 12.0],
-        /// Height of the head: the neutral difference, m, and the weight of one metre below it.
+        /// Height of the head: the neutral difference, m, and the weight per metre below it.
         pub height: [f64; 2] = [-0.045, 7.009],
-        /// Weight of being nearer to the person's appearance than to those of others seen beside
-        /// them.
+        /// Weight of being more similar to the person than to others seen beside them.
         #[schemars(range(min = 0.0))]
         pub rivals: f64 = 5.49,
-        /// Calibration of the reported probability: pairs of the probability by the log-odds above
-        /// and of the share of true matches among detections with it, both rising, with straight
-        /// lines in between. Decisions use the log-odds alone. Without pairs the probability is
-        /// reported as it is. `tagalong follow --fit` prints pairs by isotonic regression.
+        /// Calibration of the reported probability: pairs of the probability from the log-odds
+        /// above and the share of true matches among detections with that probability; both rise,
+        /// and lines connect the pairs. Decisions use the log-odds alone. Without pairs the
+        /// probability is reported unchanged. `tagalong follow --fit` prints pairs by isotonic
+        /// regression.
         pub calibration: Vec<[f64; 2]>,
     }
 }
@@ -147,13 +147,13 @@ impl LooksSettings {
 }
 
 settings! {
-    /// Search for a lost person. It needs free space around the robot; without it the robot stands
-    /// still when the person is lost.
+    /// Search for a lost person. It needs free space around the robot; while it is off, the robot
+    /// stops when the person is lost.
     #[non_exhaustive]
     pub struct SearchSettings {
-        /// Turn towards where the person went, and drive to the last seen position.
+        /// Turns towards where the person went, and drives to the last seen position.
         pub enabled: bool = false,
-        /// Time to wait first, s: most people come back by themselves.
+        /// Time to wait before the search starts, s: most people come back by themselves.
         #[schemars(range(min = 0.0))]
         pub wait_s: f64 = 1.0,
         /// Largest turn rate, rad/s.
@@ -162,13 +162,13 @@ settings! {
         /// Largest speed, m/s.
         #[schemars(extend("exclusiveMinimum" = 0))]
         pub speed_mps: f64 = 0.4,
-        /// Distance to the last seen position that counts as arrived, m.
+        /// Distance from the last seen position at which the robot has arrived, m.
         #[schemars(extend("exclusiveMinimum" = 0))]
         pub arrive_m: f64 = 0.6,
         /// Time after which the drive there is given up, s.
         #[schemars(range(min = 0.0))]
         pub drive_s: f64 = 8.0,
-        /// Time after which the search is given up and the robot stands still, s.
+        /// Time after which the search is given up and the robot stops, s.
         #[schemars(range(min = 0.0))]
         pub give_up_s: f64 = 20.0,
     }

@@ -1,4 +1,4 @@
-//! Configs that are part of the program.
+//! Configs that are built into the program.
 
 use std::io::{self, ErrorKind};
 use std::path::Path;

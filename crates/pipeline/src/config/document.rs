@@ -1,6 +1,6 @@
 //! A config with the configs that it extends: `extends = "base.toml"`.
 //!
-//! The texts are read as one, end to end: a byte range says in which file it lies.
+//! The texts are joined end to end, so that a byte range identifies the file in which it lies.
 
 use std::io;
 use std::mem;

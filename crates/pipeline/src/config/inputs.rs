@@ -1,4 +1,4 @@
-//! Inputs that a pipeline declares: those of its plugins and its own.
+//! Inputs that a pipeline declares: those of its plugins, and its own.
 
 use std::ops::Range;
 

@@ -5,19 +5,19 @@ use tagalong_config::{ConfigError, Value, parse_settings};
 /// Name of the table.
 pub(super) const TABLE: &str = "suits";
 
-/// Cameras and robots that a config was fitted to and tried on. A run with others goes on, with a note;
-/// `tagalong doctor` warns of them, too.
+/// Cameras and robots for which a config was fitted and tested. A run with others continues with a
+/// note; `tagalong doctor` also warns about them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Suits {
-    /// Lowest and highest camera above the floor, m.
+    /// Lowest and highest position of the camera above the floor, m.
     pub camera_height_m: Option<[f64; 2]>,
-    /// Least and greatest angle of the optical axis below the horizon, degrees.
+    /// Smallest and largest angle of the optical axis below the horizon, degrees.
     pub pitch_down_deg: Option<[f64; 2]>,
-    /// Least and greatest distance of the right camera from the left one, m. `tagalong run LOG` chooses the
-    /// config for such pairs alone.
+    /// Smallest and largest distance of the right camera from the left one, m. `tagalong run LOG`
+    /// chooses the config only for such pairs.
     pub baseline_m: Option<[f64; 2]>,
-    /// True if motion over ground is evidence, so that the robot's own has to be known.
+    /// True if motion over ground is evidence, so that the robot's own motion has to be known.
     pub odometry: bool,
 }
 

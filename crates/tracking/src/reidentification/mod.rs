@@ -1,12 +1,12 @@
-//! Numbers of people across tracks.
+//! IDs of people across tracks.
 //!
-//! A track is not a person: one that ends and a later one may be of the same person, and behind another
-//! person a track may change over. This stage remembers the appearance of each person, and decides
-//! which number a track is reported with. It changes nothing else: detection, association and
-//! filter work on tracks.
+//! A track is not a person: a later track may be of the same person as one that ended, and when
+//! people occlude each other a track may switch from one to the other. This stage remembers the
+//! appearance of each person, and decides under which ID a track is reported. It changes nothing
+//! else: detection, association and filter work on tracks.
 //!
-//! A number is taken over only if the appearance is similar, every other remembered person is
-//! clearly less similar, and the person can have got there: a wrong number is worse than a new one.
+//! An ID is taken over only if the appearance is similar, every other remembered person is clearly
+//! less similar, and the person can have moved there: a wrong ID is worse than a new one.
 
 mod person;
 mod settings;

@@ -2,64 +2,64 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tagalong_core::settings;
 
-/// Log-likelihood ratio that a difference of two appearances amounts to, for the associator.
+/// Log-likelihood ratio of a difference between two appearances, for the associator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum AppearanceEvidence {
-    /// 1 for equal appearances, falling with the difference to 0 at `max_difference`, and to no less
-    /// than -1.
+    /// 1 for equal appearances; it falls with the difference to 0 at `max_difference`, and not
+    /// below -1.
     #[default]
     Linear,
-    /// The log-odds of 1 minus half the difference below `max_difference`, and 0 from there on: as
+    /// Below `max_difference` the log-odds of 1 minus half the difference, and 0 from there on, as
     /// in BoT-SORT (N. Aharon et al., arXiv 2206.14651, section 3.3).
     HalfDistance,
 }
 
 settings! {
-    /// Recognition of people by their appearance: a person whose track ended keeps the number when
-    /// another track starts, and two people who passed each other are told apart.
+    /// Recognition of people by their appearance: a person whose track ended keeps their ID when
+    /// another track starts, and so do two people who passed each other.
     #[non_exhaustive]
     pub struct ReidentificationSettings {
-        /// Time for which a person without a track is remembered, s. 0: each track has a number of
-        /// its own.
+        /// Time for which a person without a track is remembered, s. 0: each track has an ID of its
+        /// own.
         #[schemars(range(min = 0.0))]
         pub remember_s: f64 = 0.0,
-        /// Largest difference of two appearances of one person: the mean of the Hellinger distances
-        /// of the visible parts, or 1 minus the cosine of the vectors of `[appearance]`.
+        /// Largest difference between two appearances of one person: the mean of the Hellinger
+        /// distances of the visible parts, or 1 minus the cosine of the embeddings of
+        /// `[appearance]`.
         #[schemars(range(min = 0.0, max = 1.0))]
         pub max_difference: f64 = 0.3,
-        /// Every other remembered person must differ by this much more.
+        /// Margin by which the difference of every other remembered person must be larger.
         #[schemars(range(min = 0.0, max = 1.0))]
         pub margin: f64 = 0.06,
-        /// Largest difference of the heights of the head, m.
+        /// Largest difference between the heights of the head, m.
         #[schemars(range(min = 0.0))]
         pub max_height_m: f64 = 0.15,
-        /// Speed beyond which a person cannot have got to where a track starts, m/s.
+        /// Speed above which a person cannot have reached the start of a track, m/s.
         #[schemars(range(min = 0.0))]
         pub max_speed_mps: f64 = 3.0,
-        /// Acceleration beyond which a person cannot have turned to where a track starts, m/s²: one
-        /// who walked out of the image is not at the other end of the room soon after. As large as
-        /// 1,000 it excludes nothing.
+        /// Acceleration above which a person cannot have reached the start of a track, m/s²: one
+        /// who walked out of the image is not at the other end of the room soon after. A value as
+        /// large as 1,000 excludes nothing.
         #[schemars(range(min = 0.0))]
         pub max_acceleration_mps2: f64 = 1e3,
-        /// A track may take over a number for this time after its start, s.
+        /// Time after its start in which a track may take over an ID, s.
         #[schemars(range(min = 0.0))]
         pub decide_s: f64 = 2.0,
-        /// Two tracks that come nearer to each other than this, m, may change over, and are
-        /// compared after they part.
+        /// Distance below which two tracks may swap their people, m; they are compared after they
+        /// part.
         #[schemars(range(min = 0.0))]
         pub alone_m: f64 = 0.6,
-        /// Weight of the appearance, by which the associator prefers a detection that looks like
-        /// the person of a track: a factor of `association_evidence`. With `linear` it is the
-        /// log-likelihood ratio of equal appearances, with `half-distance` 1 is BoT-SORT. 0:
-        /// positions alone decide.
+        /// Weight of the appearance in the association, which then prefers a detection that looks
+        /// like the person of a track: a factor on `association_evidence`. With `linear` it is the
+        /// log-likelihood ratio of equal appearances; with `half-distance` a weight of 1 is
+        /// BoT-SORT. 0: positions alone decide.
         #[schemars(range(min = 0.0, max = 100.0))]
         pub association_weight: f64 = 0.0,
-        /// Log-likelihood ratio that a difference of appearances amounts to: `linear` or
-        /// `half-distance`.
+        /// Log-likelihood ratio of a difference in appearance: `linear` or `half-distance`.
         pub association_evidence: AppearanceEvidence = AppearanceEvidence::Linear,
-        /// Number of appearances by which tracks that parted are compared.
+        /// Number of appearances with which tracks are compared after they parted.
         #[schemars(range(min = 1))]
         pub appearances: u32 = 2,
     }

@@ -6,15 +6,15 @@ settings! {
     pub struct Config {
         /// `mahalanobis` (metres) or `overlap` (pixels).
         pub cost: Cost = Cost::Mahalanobis,
-        /// Overlap: smallest overlap.
+        /// For `overlap`: smallest overlap.
         #[schemars(range(min = 1e-6, max = 1.0))]
         pub min_overlap: f64 = 0.3,
-        /// Overlap: `iou` or `dice`.
+        /// For `overlap`: measure of the overlap, `iou` or `dice`.
         pub overlap: Overlap = Overlap::Iou,
         /// Cost of leaving a track without a detection, as a multiple of the cost at the gate.
         #[schemars(range(min = 1e-6, max = 1e6))]
         pub miss_factor: f64 = 1.0,
-        /// Gate in metres, and the part of the appearance.
+        /// Gate in metres, and the weight of the appearance.
         #[serde(flatten)]
         pub gating: GateSettings,
     }

@@ -1,9 +1,9 @@
 //! `associate-hungarian`: one detection for each track, by the global assignment with the
 //! least sum of costs (Kuhn 1955; solved by shortest augmenting paths).
 //!
-//! The cost of a pair is the negative log-likelihood d² + ln |S| of the innovation in the
-//! robot frame, or -ln of the overlap in the image. A track may be left alone at a price, so
-//! that a bad pair is not forced.
+//! The cost of a pair is the negative log-likelihood d² + ln |S| of the innovation in the robot
+//! frame, or -ln of the overlap in the image. A track may stay without a detection at a fixed cost,
+//! so that a bad pair is not forced.
 
 mod associate;
 mod config;

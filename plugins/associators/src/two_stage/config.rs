@@ -12,9 +12,9 @@ pub struct Config {
     /// The settings of `associate-hungarian`.
     #[serde(flatten)]
     pub pairs: hungarian::Config,
-    /// Detections from these log-odds on are strong.
+    /// Log-odds from which a detection is strong.
     pub strong_log_odds: f64,
-    /// A weak detection continues a track only within this part of the gate, 0 to 1.
+    /// Fraction of the gate within which a weak detection continues a track, 0 to 1.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub weak_gate: f64,
 }

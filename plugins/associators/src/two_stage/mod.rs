@@ -1,8 +1,8 @@
-//! `associate-two-stage`: strong detections are assigned first, and weak ones to the tracks that
-//! are left (ByteTrack: Zhang et al., *Multi-Object Tracking by Associating Every Detection
-//! Box*, ECCV 2022, Algorithm 1).
+//! `associate-two-stage`: strong detections are assigned first, and weak ones to the remaining
+//! tracks (ByteTrack: Zhang et al., *Multi-Object Tracking by Associating Every Detection Box*,
+//! ECCV 2022, Algorithm 1).
 //!
-//! A weak detection is often a half-hidden person. It continues a track that nothing else
+//! A weak detection is often a half-hidden person. It continues a track that no strong detection
 //! explains, and starts none.
 
 mod associate;

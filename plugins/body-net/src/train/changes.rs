@@ -1,4 +1,4 @@
-//! A candidate, as it could have looked as well.
+//! Random changes of a candidate that keep it realistic (data augmentation).
 
 use tagalong_learn::mix;
 

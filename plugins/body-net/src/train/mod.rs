@@ -1,5 +1,6 @@
-//! Fits a [`Model`] to labelled candidates: networks learn from all groups but some, their outputs
-//! on those calibrate the log-odds, and one that has seen all makes the model.
+//! Fits a [`Model`] to labelled candidates: networks are trained with some groups held out, their
+//! outputs on those groups calibrate the log-odds, and a network trained on all groups is the
+//! model.
 
 mod changes;
 

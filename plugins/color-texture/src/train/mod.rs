@@ -1,6 +1,6 @@
-//! Fits a [`Model`] to labelled candidates: trees are found one after the
-//! other, how many is chosen by cross-validation over groups, and the sums of
-//! the held-out candidates calibrate the log-odds.
+//! Fits a [`Model`] to labelled candidates: trees are added one after the other, their number is
+//! chosen by cross-validation over groups, and the sums of the held-out candidates calibrate the
+//! log-odds.
 
 mod boost;
 

@@ -3,68 +3,68 @@ use serde::{Deserialize, Serialize};
 use tagalong_config::check_settings;
 use tagalong_core::{Error, Result, settings};
 
-/// Way to the target.
+/// Path to the target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum Path {
     /// The circle that leaves along the robot's heading and meets the target.
     A,
-    /// Turns on the spot until it faces the target, then drives straight.
+    /// Turns in place until the robot faces the target, then drives straight.
     B,
-    /// Turns towards the target while driving: the radius of the circle is
-    /// divided by `path_gain`.
+    /// Turns towards the target while driving: the radius of the circle is divided by `path_gain`.
     C,
 }
 
 settings! {
     /// Settings of the controller `arc-follow`.
     pub struct Config {
-        /// The way to the target: "A" on a circle, "B" turn first and then
-        /// straight, "C" turn while driving.
+        /// Path to the target: "A" on a circle, "B" first a turn and then straight, "C" turns while
+        /// driving.
         pub path: Path = Path::C,
-        /// Divisor of the radius of the circle on path C: 1.5 to 2.5 for usual
-        /// fields of view. No unit.
+        /// Divisor of the radius of the circle on path C, without unit: 1.5 to 2.5 for usual fields
+        /// of view.
         #[schemars(range(min = 1e-6, max = 1e6))]
         pub path_gain: f64 = 2.0,
-        /// Distance kept from the person, m, on the floor.
+        /// Distance on the floor that the robot keeps from the person, m.
         #[schemars(range(min = 0.0, max = 1e6))]
         pub stand_off_m: f64 = 1.4,
-        /// Speed for each metre beyond the stand-off, 1/s.
+        /// Speed per metre beyond the stand-off, 1/s.
         #[schemars(range(min = 1e-6, max = 1e6))]
         pub range_gain_per_s: f64 = 0.8,
-        /// Speeds up by at most this much, m/s².
+        /// Largest acceleration, m/s².
         #[schemars(range(min = 1e-6, max = 1e6))]
         pub max_acceleration: f64 = 0.5,
-        /// Slows down by at most this much, m/s².
+        /// Largest deceleration, m/s².
         #[schemars(range(min = 1e-6, max = 1e6))]
         pub max_deceleration: f64 = 1.0,
-        /// Turning for each radian of bearing while the robot stands, 1/s; it
-        /// fades as the robot drives faster.
+        /// Turn rate per radian of bearing while the robot is at rest, 1/s; it decreases as the
+        /// robot drives faster.
         #[schemars(range(min = 0.0, max = 1e6))]
         pub bearing_gain_per_s: f64 = 1.0,
-        /// Turns no faster than this, rad/s.
+        /// Largest turn rate, rad/s.
         #[schemars(range(min = 1e-6, max = 1e6))]
         pub max_turn_rate: f64 = 1.2,
         /// Largest curvature of the path, 1/m.
         #[schemars(range(min = 0.0, max = 1e6))]
         pub max_curvature: f64 = 3.0,
-        /// A target nearer than this steers as if it were this far away, m.
+        /// Least distance with which the steering computes, m: a nearer target steers as if it were
+        /// this far away.
         #[schemars(range(min = 1e-6, max = 1e6))]
         pub min_range_m: f64 = 0.5,
-        /// Paths A and C stop and turn on the spot while the bearing exceeds the
-        /// second of these angles, and until it is below the first, degrees.
+        /// Bearings below which a turn in place ends and above which it starts, on paths A and C,
+        /// degrees.
         pub turn_in_place_deg: [f64; 2] = [30.0, 60.0],
-        /// The same for path B, which steers in no other way, degrees.
+        /// The same for path B, which has no other way to steer, degrees.
         pub align_deg: [f64; 2] = [3.0, 12.0],
-        /// Steers to where the person went, this far ahead, m, instead of straight to the
-        /// person: through the middle of doors and round corners. 0 is off.
+        /// Distance ahead, m, of the point on the person's trail to which the robot steers, instead
+        /// of straight to the person: through the middle of doors and round corners. 0: off.
         #[schemars(range(min = 0.0, max = 1e6))]
         pub trail_m: f64 = 0.0,
-        /// Drives after a person that is not seen for half of this time, then slows down, and
-        /// stands still at the end of it, s.
+        /// Time after which the robot stops if the person is not seen, s; it drives on for half of
+        /// this time, and then slows down.
         #[schemars(range(min = 1e-6, max = 1e6))]
         pub max_unseen_s: f64 = 1.0,
-        /// From the capture of an image until the wheels answer to it, s: the
-        /// target is predicted by as much.
+        /// Latency from the capture of an image until the wheels respond to it, s: the target is
+        /// predicted over this time.
         #[schemars(range(min = 0.0, max = 1e6))]
         pub latency_s: f64 = 0.1,
     }

@@ -1,15 +1,16 @@
-//! `clear-follow`: faces the person, keeps the distance, and takes the least detour that stays
+//! `clear-follow`: faces the person, keeps the distance, and takes the smallest detour that stays
 //! clear of obstacles.
 //!
-//! A dynamic window (Fox, Burgard and Thrun, 1997) asks which of all commands scores best, and so
-//! jumps from one to the next. Here there is one command that would be right in an empty room: it
-//! turns the robot towards where the person will be seen, as fast as they walk around it, and keeps
-//! the distance. The plan is the smallest change of it that keeps clear of things and people over
-//! the next second and a half and does not lose the person behind another one. In an empty room
-//! nothing is changed, and the ride is as smooth as the law.
+//! A dynamic window (Fox, Burgard and Thrun, 1997) scores all commands and takes the best, and so
+//! jumps from one to the next. This controller starts from the one command that would be right in
+//! an empty room: it turns the robot towards where the person will be seen, as fast as they walk
+//! around it, and keeps the distance. The plan is the smallest change of that command that stays
+//! clear of obstacles and people over the next second and a half and does not lose the person
+//! behind another one. In an empty room nothing is changed, and the ride is as smooth as the
+//! control law.
 //!
-//! Things that a turn has moved out of the image are remembered: the inside of a corner is where a
-//! robot that follows a person hits it.
+//! Obstacles that a turn has moved out of the image are remembered, because a robot that follows a
+//! person hits the inside of a corner.
 
 mod config;
 mod control;

@@ -1,4 +1,4 @@
-//! Cost of a way, step by step.
+//! Cost of a path, step by step.
 
 use nalgebra::{Isometry2, Point2};
 

@@ -1,4 +1,4 @@
-//! Law that answers to where the person is: what a robot in an empty room does.
+//! Control law of the position of the person: what the robot does in an empty room.
 
 use nalgebra::{Isometry2, Point2, Vector2};
 use tagalong_core::Twist;

@@ -1,14 +1,15 @@
-//! `foresee-follow`: goes with a person at a distance and a side, by a plan of the next four seconds.
+//! `foresee-follow`: accompanies a person at a distance and on a side, with a plan of the next four
+//! seconds.
 //!
-//! The plan is one of some hundred ways to go on. Each begins with a change of the law (another turn, a
-//! lower speed, a pause, a place nearer to the person's track) and then returns to the law, which
-//! answers to where the person will be. So each way is driven to its end among the forecasts of
-//! all people, and the cheapest is taken: a robot that waits until others have passed, or steps back
-//! in line before a door, needs no rule for it.
+//! The plan is one of some hundred candidate paths. Each begins with a change of the control law
+//! (another turn rate, a lower speed, a pause, a position nearer to the person's track) and then
+//! returns to the law, which responds to where the person will be. Each path is driven to its end
+//! among the forecasts of all people, and the cheapest one is taken: the robot waits until others
+//! have passed, or moves back in line before a door, without a rule for it.
 //!
-//! Adap-RPF (Situ et al., arXiv 2510.11308) samples places around the person and then velocities. Here
-//! both are one: a law with a changed beginning is a smooth way that a robot can drive, and some
-//! hundred of them replace thousands of random ones.
+//! Adap-RPF (Situ et al., arXiv 2510.11308) samples positions around the person and then
+//! velocities. Here both are one: a law with a changed beginning is a smooth path that a robot can
+//! drive, and some hundred of them replace thousands of random ones.
 
 mod config;
 mod control;

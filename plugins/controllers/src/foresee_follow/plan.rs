@@ -1,4 +1,4 @@
-//! Ways to go on, each a law with a changed beginning, and the cheapest of them.
+//! Candidate paths, each a control law with a changed beginning, and the cheapest of them.
 
 use std::f64::consts::PI;
 

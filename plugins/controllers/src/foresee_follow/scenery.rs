@@ -1,4 +1,4 @@
-//! Surroundings of a plan: forecasts of all people at each of its steps, and things.
+//! Surroundings of a plan: obstacles, and forecasts of all people at each of its steps.
 
 use nalgebra::{Matrix2, Point2, Vector2};
 

@@ -1,5 +1,5 @@
-//! Fits a [`Model`] to annotated frames: first to simulated rooms, then to simulated and real
-//! ones. The second part is repeated with each real room left out; the answers there give the
+//! Fits a [`Model`] to annotated frames: first to simulated rooms, then to simulated and real ones.
+//! The second part is repeated with each real room left out; the outputs on that room give the
 //! figures of the card and calibrate the log-odds.
 
 mod sample;

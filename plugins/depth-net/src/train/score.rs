@@ -1,4 +1,4 @@
-//! Scores of answers: recall, false people per frame, distance from the truth.
+//! Scores of the outputs: recall, false positives per frame, position error.
 
 use super::Sample;
 use super::targets::surfaces_m2;

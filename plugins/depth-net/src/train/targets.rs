@@ -1,4 +1,4 @@
-//! The answer that a map should get.
+//! Target output of the network for a map.
 
 use nalgebra::{Point2, Vector2};
 use tagalong_config::AnnotatedPerson;

@@ -1,4 +1,4 @@
-//! Accuracy of a cascade on pictures that it was not trained with.
+//! Accuracy of a cascade on pictures that were not used in its training.
 
 use tagalong_geometry::Rect;
 use tagalong_learn::{Line, platt};

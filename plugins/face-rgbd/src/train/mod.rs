@@ -1,9 +1,9 @@
-//! Trainer of a [`Cascade`]: stage after stage by Gentle AdaBoost, each with the false alarms of
+//! Trainer of a [`Cascade`]: stage by stage with Gentle AdaBoost, each stage on the false alarms of
 //! all stages before it (Viola and Jones 2001; J. Friedman, T. Hastie and R. Tibshirani, *Additive
 //! logistic regression*, Annals of Statistics 28, 2000).
 //!
 //! By default, a tenth of the groups is held out for the calibration and a fifth for the figures of
-//! the card; the stages see neither.
+//! the card; the stages are trained on neither.
 
 mod boost;
 mod figures;

@@ -1,4 +1,4 @@
-//! Windows, cut out of pictures.
+//! Windows cut out of pictures.
 
 use tagalong_core::GreyImage;
 use tagalong_geometry::Rect;

@@ -8,7 +8,7 @@ use tagalong_core::{Error, Result, settings};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Form {
-    /// u = 0: where they were.
+    /// u = 0: the last position.
     Still,
     /// u is the difference of the last two posterior positions.
     LastDifference,
@@ -20,11 +20,11 @@ pub enum Form {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Measurement {
-    /// By the detection's own covariance.
+    /// The detection's own covariance.
     Detection,
     /// `measurement_m2` for every detection.
     Fixed,
-    /// By `sigma_range_m`, `sigma_range_per_m` and `sigma_bearing_deg`.
+    /// From `sigma_range_m`, `sigma_range_per_m` and `sigma_bearing_deg`.
     Polar,
 }
 
@@ -35,34 +35,34 @@ settings! {
         pub form: Form = Form::ConstantVelocity,
         /// Covariance of detections: `detection`, `fixed` or `polar`.
         pub measurement: Measurement = Measurement::Detection,
-        /// Q of the forms without velocity: xx, xy, yy in room axes, m² per `step_s`.
+        /// Process noise Q of the forms without velocity: xx, xy, yy in room axes, m² per `step_s`.
         #[schemars(inner(range(min = -999_999, max = 999_999)))]
         pub process_m2: [f64; 3] = [0.024, -0.001, 0.043],
-        /// The time between two images to which Q belongs, s.
+        /// Time between two images for which Q is given, s.
         #[schemars(range(min = 1e-3, max = 1e3))]
         pub step_s: f64 = 1.0 / 3.0,
-        /// R of `fixed`: xx, xy, yy in room axes, m².
+        /// Measurement noise R of `fixed`: xx, xy, yy in room axes, m².
         #[schemars(inner(range(min = -999_999, max = 999_999)))]
         pub measurement_m2: [f64; 3] = [0.011, -0.004, 0.020],
-        /// Of `polar`: standard deviation of the range at the robot, m.
+        /// For `polar`: standard deviation of the range at the robot, m.
         #[schemars(range(min = 1e-3, max = 1e3))]
         pub sigma_range_m: f64 = 0.05,
-        /// Of `polar`: increase per metre of range, m.
+        /// For `polar`: increase of that standard deviation per metre of range, m.
         #[schemars(range(min = 0.0, max = 1e3))]
         pub sigma_range_per_m: f64 = 0.03,
-        /// Of `polar`: standard deviation of the bearing, degrees.
+        /// For `polar`: standard deviation of the bearing, degrees.
         #[schemars(range(min = 1e-3, max = 1e3))]
         pub sigma_bearing_deg: f64 = 1.0,
-        /// Of `constant-velocity`: spectral density of the white acceleration, m²/s³.
+        /// For `constant-velocity`: spectral density of the white acceleration, m²/s³.
         #[schemars(range(min = 1e-6, max = 1e3))]
         pub acceleration_noise: f64 = 0.2,
-        /// Standard deviation of a newcomer's velocity components, m/s.
+        /// Standard deviation of the velocity components of a new track, m/s.
         #[schemars(range(min = 1e-3, max = 1e3))]
         pub initial_speed_mps: f64 = 1.0,
         /// Random walk of the height of the head, m per square root of a second.
         #[schemars(range(min = 0.0, max = 1e3))]
         pub height_noise: f64 = 0.03,
-        /// From the robot's heading at the start to the X axis of the room, degrees.
+        /// Angle from the robot's heading at the start to the X axis of the room, degrees.
         #[schemars(range(min = -360.0, max = 1e3))]
         pub room_heading_deg: f64 = 0.0,
     }

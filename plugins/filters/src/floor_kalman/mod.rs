@@ -1,13 +1,13 @@
-//! `floor-kalman`: a Kalman filter of where each person is on the floor, in coordinates of the room
-//! (P5, section 5).
+//! `floor-kalman`: Kalman filter of each person's position on the floor, in room coordinates (P5,
+//! section 5).
 //!
 //! The paper's state is the position alone, and its prediction adds a "nominal velocity" u, which
-//! is a displacement: nothing multiplies it by time. The paper does not say how u is found.
-//! [`Form`] has the possible meanings: nothing, the last posterior difference or, as in most
-//! trackers, two more states.
+//! is a displacement, because nothing multiplies it by time. The paper does not say how u is
+//! determined. [`Form`] has the possible meanings: zero, the difference of the last posterior
+//! positions or, as in most trackers, two more states.
 //!
-//! The room is the robot's frame at the start of the run, turned by `room_heading_deg`; odometry
-//! carries it on, so the robot may move.
+//! The room frame is the robot frame at the start of the run, rotated by `room_heading_deg`;
+//! odometry propagates it, so the robot may move.
 
 mod config;
 mod filter;

@@ -1,10 +1,11 @@
-//! Models of one person's motion: one, or two that interact (H. Blom and Y. Bar-Shalom, *The
+//! Motion models of one person: one, or two that interact (H. Blom and Y. Bar-Shalom, *The
 //! interacting multiple model algorithm for systems with Markovian switching coefficients*, IEEE
 //! Transactions on Automatic Control 33(8), 1988).
 //!
-//! A person walks steadily most of the time. A filter with little noise averages the detections then
-//! and loses a person who stops; one with much noise follows and believes every error of a detector.
-//! Two filters, weighted by the likelihoods of the detections, do both.
+//! A person walks steadily most of the time. A filter with little process noise averages the
+//! detections then, but loses a person that stops; a filter with much process noise follows that
+//! person, but also every error of a detector. Two filters, weighted by the likelihoods of the
+//! detections, do both.
 
 use tagalong_core::{Detection, EgoMotion, Estimate, Update};
 use tagalong_geometry::Camera;

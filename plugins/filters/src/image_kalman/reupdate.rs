@@ -1,8 +1,8 @@
 //! Observation-centric re-update: a track that is observed again after a gap is filtered anew over
-//! the gap, as if it had been observed all along the straight way between the two observations
-//! (ORU of OC-SORT: Cao et al., CVPR 2023).
+//! the gap, as if it had been observed along the straight line between the two observations (ORU of
+//! OC-SORT: Cao et al., CVPR 2023).
 //!
-//! Without it the errors of the velocity that grew in the gap stay after its end.
+//! Otherwise the velocity errors that grew in the gap would remain after it.
 
 use tagalong_core::{Detection, EgoMotion};
 use tagalong_geometry::{Camera, ImageBox, Rect};

@@ -1,8 +1,8 @@
 //! `last-seen`: a person stays where they were last seen.
 //!
-//! The least that can be called a filter, and therefore the measure of all others: the gain of a
-//! tracker over it is the value of its model. There is no model of walking, nothing is averaged,
-//! and, if so configured, the robot's own motion is left out of account as well.
+//! The simplest possible filter, and therefore the baseline for all others: what a tracker gains
+//! over it is the value of its motion model. There is no model of walking and no averaging, and, if
+//! so configured, the robot's own motion is ignored as well.
 
 mod config;
 mod filter;

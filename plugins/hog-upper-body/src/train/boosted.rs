@@ -1,4 +1,4 @@
-//! Training of boosted trees over the values of windows.
+//! Training of boosted trees on the values of windows.
 
 use tagalong_learn::boost::{Boosting, Levels, Next, Question};
 use tagalong_learn::mix;

@@ -1,9 +1,9 @@
 //! Trainer of a [`Model`], linear or of trees: with people in several small shifts and mirrored,
-//! with random other windows at first, and after that with the false alarms of the machine in
+//! first with random windows without people, and then with the false alarms of the classifier in
 //! pictures without people.
 //!
 //! A tenth of the groups is held out for the calibration and a fifth for the figures of the card;
-//! the machine sees neither.
+//! the classifier is trained on neither.
 
 mod boosted;
 mod depth;

@@ -1,5 +1,5 @@
-//! Frames of real rooms: people beside those of photographs, false alarms from the views of a
-//! robot, and models that have not seen a room.
+//! Frames of real rooms: people in addition to those of photographs, false alarms from the
+//! viewpoint of a robot, and models that were not trained on a room.
 
 use tagalong_config::AnnotatedPerson;
 use tagalong_core::Frame;

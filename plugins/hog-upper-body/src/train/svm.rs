@@ -1,5 +1,5 @@
-//! Dual coordinate descent for a linear machine (C.-J. Hsieh et al., *A dual coordinate descent
-//! method for large-scale linear SVM*, ICML 2008, algorithm 1, with the squared hinge loss).
+//! Dual coordinate descent for a linear SVM (C.-J. Hsieh et al., *A dual coordinate descent method
+//! for large-scale linear SVM*, ICML 2008, algorithm 1, with the squared hinge loss).
 
 use crate::model::dot;
 

@@ -1,8 +1,8 @@
-//! Places at which candidates were rejected before.
+//! Positions at which candidates were rejected before.
 //!
-//! A coat stand that was rejected in twenty frames is no person when the twenty-first
-//! look is mistaken. The log-odds of all candidates at one place add up, and fade, as
-//! those of a track do (P4, section II-C, has neither).
+//! A coat stand that was rejected in twenty frames is not a person because one frame is classified
+//! wrongly. The log-odds of all candidates at one position are accumulated, and decay, like those
+//! of a track (P4, section II-C, has neither).
 
 use nalgebra::Point2;
 use tagalong_core::{Detection, EgoMotion};

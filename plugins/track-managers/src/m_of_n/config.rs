@@ -4,56 +4,54 @@ use tagalong_core::{Error, Result, settings};
 settings! {
     /// Settings of the track manager `manage-m-of-n`.
     pub struct Config {
-        /// A detection that belongs to no track starts one from this score on
-        /// (log-odds, verifiers included).
+        /// Score from which a detection without a track starts one (log-odds, including verifiers).
         pub start_score: f64 = 0.0,
-        /// Newcomers that were rejected at the same place count, too, and are forgotten with this
-        /// time constant, s; 0: each newcomer is judged alone.
+        /// Time constant with which rejected candidates at a position are forgotten, s; they count
+        /// against a new candidate there. 0: each new candidate is judged alone.
         #[schemars(range(min = 0.0, max = 1e6))]
         pub doubt_s: f64 = 0.0,
-        /// A place is the same within this, m.
+        /// Distance within which two positions are the same, m.
         #[schemars(range(min = 0.0, max = 1e6))]
         pub doubt_m: f64 = 0.3,
-        /// No place is doubted more than this, log-odds.
+        /// Bound on the log-odds against a position.
         #[schemars(range(min = 0.0, max = 1e6))]
         pub doubt_limit: f64 = 6.0,
-        /// A track is confirmed when it was seen this often ...
+        /// Number of detections that confirm a track.
         #[schemars(range(min = 1, max = 32))]
         pub confirm_hits: u32 = 2,
-        /// ... in so many frames in which it could have been seen (at most 32), ...
+        /// Number of frames, in which the track could have been seen, within which these detections
+        /// must lie; at most 32.
         #[schemars(range(min = 1, max = 32))]
         pub confirm_within: u32 = 3,
-        /// ... or in two frames in a row that are at least so far apart, s (0: never): errors of
-        /// images that are far apart in time are less alike, ...
+        /// Least time between two consecutive frames with detections that also confirm a track, s;
+        /// 0: they never do. Errors in images that are far apart in time are less correlated.
         #[schemars(range(min = 0.0, max = 1e6))]
         pub confirm_apart_s: f64 = 0.0,
-        /// ... or at once by a detection with at least this score.
+        /// Score of a detection that confirms a track at once.
         pub confirm_score: f64 = 2.0,
-        /// A track that is not confirmed ends after this many misses in a row.
+        /// Number of consecutive misses after which a tentative track ends.
         #[schemars(range(min = 1))]
         pub tentative_misses: u32 = 2,
-        /// A track ends when it should have been visible and was not seen for
-        /// longer than this, s, ...
+        /// Time without a detection after which a track that should be visible ends, s;
+        /// `drop_after_misses` must hold as well.
         #[schemars(range(min = 0.0, max = 1e6))]
         pub drop_after_s: f64 = 1.0,
-        /// ... and missed at least this often in a row.
+        /// Least number of consecutive misses with which a track ends by `drop_after_s`.
         #[schemars(range(min = 1))]
         pub drop_after_misses: u32 = 3,
-        /// A track that left the image ends when it was not seen for longer, s.
+        /// Time without a detection after which a track that left the image ends, s.
         #[schemars(range(min = 0.0, max = 1e6))]
         pub left_drop_after_s: f64 = 2.0,
-        /// A track that is hidden behind another one ends when it was not seen for
-        /// longer, s.
+        /// Time without a detection after which a track that is hidden behind another one ends, s.
         #[schemars(range(min = 0.0, max = 1e6))]
         pub occluded_drop_after_s: f64 = 3.0,
-        /// Weight of a frame in the score of a track, 0 to 1.
+        /// Weight of one frame in the score of a track, 0 to 1.
         #[schemars(range(min = 1e-6, max = 1.0))]
         pub score_weight: f64 = 0.3,
-        /// Score of a miss: the value that the score of a track tends to while it should be visible
-        /// and is not.
+        /// Score of a miss: the value to which the score of a track tends while it should be
+        /// visible and is not detected.
         pub miss_score: f64 = -1.0,
-        /// A track with a lower score ends. It takes several doubtful sightings
-        /// to get there.
+        /// Score below which a track ends. It takes several doubtful detections to get there.
         pub drop_score: f64 = -2.0,
     }
 }

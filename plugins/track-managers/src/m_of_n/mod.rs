@@ -1,9 +1,9 @@
-//! `manage-m-of-n`: a track is confirmed by M detections in N frames, and ends by its misses.
+//! `manage-m-of-n`: a track is confirmed by M detections in N frames, and ended by its misses.
 //!
-//! The rule is the common one of radar tracking (Blackman and Popoli, *Design and Analysis of
-//! Modern Tracking Systems*, 1999, section 6). Beside it stands a smoothed score of log-odds,
-//! so that a track of doubtful detections is not confirmed and ends in time, and a map of
-//! places at which candidates were rejected.
+//! The rule is the usual one of radar tracking (Blackman and Popoli, *Design and Analysis of Modern
+//! Tracking Systems*, 1999, section 6). In addition, a smoothed score of log-odds keeps a track of
+//! doubtful detections from being confirmed and ends it in time, and a map stores positions at
+//! which candidates were rejected.
 
 mod clutter;
 mod config;

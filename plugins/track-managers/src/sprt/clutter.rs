@@ -1,5 +1,4 @@
-//! Places at which things are that are no persons, in the robot frame, moved along with the
-//! world.
+//! Positions of objects that are not people, in the robot frame, moved along with the world.
 
 use nalgebra::Point2;
 use tagalong_core::EgoMotion;

@@ -1,4 +1,4 @@
-//! Looks at one track, by the places of the track and of the robot.
+//! Observations of one track, by the positions of the track and of the robot.
 
 use nalgebra::Point2;
 use tagalong_core::EgoMotion;

@@ -1,20 +1,20 @@
-//! `manage-sprt`: a track is believed by sequential evidence (Wald's sequential probability
-//! ratio test; for track scores Sittler 1964, Blackman and Popoli 1999, section 6.2).
+//! `manage-sprt`: decides about a track by sequential evidence (Wald's sequential probability ratio
+//! test; for track scores Sittler 1964, Blackman and Popoli 1999, section 6.2).
 //!
-//! The log-odds that a track is a person add up over its detections and misses until they pass
-//! one bound or the other. Two things keep furniture from gathering belief:
+//! The log-odds that a track is a person are summed over its detections and misses until they pass
+//! one bound or the other. Two rules keep furniture from accumulating evidence:
 //!
-//! * Looks at a thing that stands still before a camera that stands still are one look, repeated,
-//!   and count little more than their mean. A look counts for itself when the track is at a new place, or
-//!   the robot sees it from elsewhere.
-//! * Persons move. Each second in which a track is seen and did not move speaks against it, up to a
-//!   bound that only sure looks of verifiers outweigh. A track that has moved further than its
-//!   uncertainty explains gains belief once, and may stand still from then on. One that never moved
-//!   and was not proven ends, and its places are remembered as clutter, in the frame of the world.
-//!   Detections that rather show a thing are no motion.
+//! * Observations of a static object by a camera at rest are repetitions of one observation, and
+//!   count little more than their mean. An observation counts fully when the track is at a new
+//!   position, or the robot sees it from a new one.
+//! * People move. Each second in which a track is seen and has not moved is evidence against it, up
+//!   to a bound that only confident verifiers outweigh. A track that has moved farther than its
+//!   uncertainty explains gains evidence once, and may be at rest from then on. One that never
+//!   moved and was not confirmed ends, and its positions are remembered as clutter, in the world
+//!   frame. Detections that are more likely an object do not count as motion.
 //!
-//! A detection near a track that did not take it starts a track of its own only if it would be confirmed
-//! at once.
+//! A detection near a track that was not assigned to it starts a track of its own only if it would
+//! be confirmed at once.
 
 mod clutter;
 mod config;
