@@ -341,7 +341,7 @@ mod tests {
         }
         assert_eq!(document.can(), (true, false));
         assert!(document.apply(&Change::Redo).unwrap().is_empty());
-        // A new change is the end of the way forward.
+        // A new change clears the changes to redo.
         document.apply(&Change::Undo).unwrap();
         set(&mut document, 1, 5, 0.0);
         assert_eq!(document.can(), (true, false));

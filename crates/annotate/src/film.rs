@@ -143,14 +143,14 @@ impl Film {
 
     fn depth(&self, number: u32) -> Option<DepthImage> {
         let (piece, width, height) = self.shot(number)?.depth?;
-        // A temporary file that fails leaves the place empty, as a frame without depth does.
+        // If the temporary file fails, the position is unknown, as in a frame without depth.
         unpacked(&self.read(piece).ok()?, width, height)
     }
 
     /// Measures the positions of the heads of people in the boxes of a frame.
     pub fn places(&self, number: u32, regions: &[Region]) -> Vec<Option<Place>> {
         let camera = self.shot(number).map(|shot| Arc::clone(&shot.camera));
-        // Unpacking takes longer than measuring, so it is done once for all.
+        // Decompressing takes longer than measuring, so it is done once for all people.
         let (Some(camera), Some(depth)) = (camera, self.depth(number)) else {
             return vec![None; regions.len()];
         };
@@ -161,7 +161,7 @@ impl Film {
     pub fn head(&self, number: u32, region: &Region, depth_m: f64) -> Option<[f64; 3]> {
         let square = Rect::new(region.x, region.y, region.width, region.height);
         let camera = &self.shot(number)?.camera;
-        // The depth of a panorama is horizontal, and no coordinate of a place.
+        // The depth of a panorama is a horizontal distance, and not a coordinate of the position.
         camera.panorama().is_none().then(|| head_at(camera, &square, depth_m))?
     }
 
@@ -217,7 +217,7 @@ fn fits_box(camera: &Camera, square: &Rect, depth_m: f64) -> bool {
 /// Returns the surface of the head of a person in a box at a depth, in the camera frame, m.
 fn head_at(camera: &Camera, square: &Rect, depth_m: f64) -> Option<[f64; 3]> {
     let centre = camera.robot_from_camera.inverse() * camera.head_of(square, depth_m);
-    // Annotations hold the surface; the centre lies behind it.
+    // Annotations contain the surface; the centre lies behind it.
     let ray = centre.coords.try_normalize(1e-6)?;
     Some(rounded(&(centre - ray * HEAD_RADIUS_M)))
 }
@@ -233,7 +233,7 @@ fn packed(depth: &DepthImage) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::with_capacity(2 * depth.pixels().len());
     for metres in depth.pixels() {
         let units = (metres / DEPTH_UNIT_M).round();
-        // NaN fails the comparison, too; depth beyond 65 m is as good as none.
+        // NaN fails the comparison, too; depth beyond 65 m counts as no reading.
         let is_known = (1.0..=f32::from(u16::MAX)).contains(&units);
         bytes.extend(if is_known { units as u16 } else { 0 }.to_le_bytes());
     }

@@ -120,7 +120,7 @@ impl Person {
         let (after, new) = self.keys.range(frame..).next()?;
         let share = f64::from(frame - before) / f64::from(after - before);
         let region = between(&old.region, &new.region, share);
-        // The notes hold until the next key changes them.
+        // The attributes are valid until the next key changes them.
         let mut notes = Key { visible_body: None, head_in_camera_m: None, ..old.clone() };
         // The frames between two keys are reviewed if both of them are.
         if notes.proposed.is_empty() {
@@ -131,7 +131,7 @@ impl Person {
 
     /// Sets the key of a frame.
     pub fn set(&mut self, frame: u32, key: Key) {
-        // A key beyond the ends does not fill the frames that the person was not in.
+        // A key beyond the ends does not fill frames without the person.
         let old = self.span();
         self.holes.remove(&frame);
         self.keys.insert(frame, key);

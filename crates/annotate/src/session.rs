@@ -240,7 +240,7 @@ impl Session {
         let region = if is_key { found.region } else { tenths(found.region) };
         let region = clipped(region, camera.width, camera.height)?;
         let head = self.head(id, number, &found);
-        // 1 is the word for boxes and places that were not measured.
+        // The file has 1 for boxes and positions that were not measured.
         let measured = head.map_or(1, |(_, origin)| origin);
         Some(Row {
             frame: number,
@@ -263,7 +263,7 @@ impl Session {
     fn fill_places(&self, person: &Person, rows: &mut [Row]) {
         let known: Vec<(u32, f64)> = rows
             .iter()
-            // Places that were filled in before are none to begin with.
+            // Positions that were filled in before do not count as measured.
             .filter(|row| row.interpolated != 1 || !row.key)
             .filter_map(|row| {
                 let size = person.at(row.frame).map_or(0.0, |key| key.region.width);
@@ -452,7 +452,7 @@ mod tests {
         assert!(rows.iter().all(|row| row.head_in_camera_m.is_some()), "depth fills the place in");
         let keys: Vec<_> = rows.iter().map(|row| (row.key, row.interpolated)).collect();
         assert_eq!((keys[0], keys[1]), ((true, 0), (false, 1)));
-        // Another program goes on where this one was killed.
+        // Another process continues where this one was killed.
         let people = read_people(&path, &film(12)).unwrap();
         let mut second = Session::new(Arc::new(film(12)), people, path.clone());
         second.apply(&Change::Note { frame: 9, id: 1, ignore: Some(true), visible: None }).unwrap();

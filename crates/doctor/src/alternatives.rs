@@ -36,7 +36,7 @@ pub fn tried(visit: &Visit, scope: Scope, registry: &Registry) -> Vec<Alternativ
     let progress = Progress::titled(&format!("{} other settings", runners.len()));
     for number in 0..scope.frames {
         let Some(item) = frames.next_frame() else { break };
-        // A pipeline that fails on this log is no alternative.
+        // A pipeline that fails on this log is not an alternative.
         runners.retain_mut(|runner| runner.step(&item));
         progress.advance(frames.progress(), number);
     }

@@ -26,9 +26,9 @@ pub fn compare(args: &DoctorArgs, scope: Scope, registry: &Registry) -> Result<D
     let mut rows = Vec::new();
     let mut first = None;
     for Fitting { choice, config } in found.fitting {
-        // The checks are those of the first.
+        // Only the checks of the first pipeline are reported.
         let scope = Scope { with_samples: first.is_none(), ..scope };
-        // That of an installed network has the name by which `run` takes it.
+        // The config of an installed network gets the name that `run` accepts.
         let name = config.stem();
         let visit = Visit::make(config, scope, registry)?;
         if let Some(folder) = &args.output {

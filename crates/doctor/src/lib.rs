@@ -64,7 +64,7 @@ use self::visit::{Scope, Visit};
 /// log is not an error, but gives exit code 3.
 pub fn doctor(args: &DoctorArgs, registry: &Registry) -> Outcome {
     let config = args.config.as_deref().map(ConfigFile::read).transpose()?;
-    // The mistakes of a config are told before those of the log.
+    // Errors in a config are reported before those of the log.
     if let Some(config) = &config {
         config.pipeline(registry, None)?;
     }

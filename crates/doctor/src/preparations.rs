@@ -97,7 +97,7 @@ impl Bench<'_> {
             let result = self.run(&settings)?;
             Some((settings, result))
         });
-        // Of equals the first one stays.
+        // Of equal ones the first is kept.
         let best = results.reduce(|best, other| {
             let is_better = other.1.score > best.1.score + SAME;
             if is_better { other } else { best }

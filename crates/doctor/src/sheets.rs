@@ -74,7 +74,7 @@ mod tests {
         let sheet = sheet("a test", &examples).into_image();
         assert_eq!((sheet.width(), sheet.height()), (4 * 64 + 4, 2 * 64 + 22 + 4));
         let red = sheet.pixels().iter().filter(|pixel| **pixel == [200, 0, 0]).count();
-        // The number of the frame covers a strip of each.
+        // The number of the frame covers a strip of each picture.
         assert!(red > 5 * 2400, "{red}");
     }
 

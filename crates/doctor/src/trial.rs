@@ -134,8 +134,8 @@ impl<T> Spread<T> {
         if !is_due {
             return;
         }
-        // When it is full, every other item goes and the stride doubles, so that the rest stays
-        // even.
+        // When it is full, every other item is dropped and the stride doubles, so that the
+        // remaining items stay evenly spaced.
         if self.kept.len() == EXAMPLES {
             let mut number = 0;
             self.kept.retain(|_| {

@@ -62,11 +62,11 @@ impl Visit {
         let (mut pipeline, settings) = config.pipeline(registry, None)?;
         let outer = scope.input.applied(config.outer_for(&pipeline)?);
         let inputs = pipeline.inputs();
-        // Light and coverage are judged, and pictures are rendered, also where the pipeline does
+        // Exposure and coverage are judged, and pictures are rendered, even if the pipeline does
         // not use colour or depth.
         let read = inputs.accept(Input::Colour).accept(Input::Depth);
         let mut found = examine(scope.log, &outer.input, &outer.limits, read)?;
-        // A topic of a wrong kind is a mistake of the config, and shown as such.
+        // A topic of a wrong kind is an error in the config, and is reported as such.
         let is_mistake = matches!(
             found.refusal,
             Some(LogError::WrongTopic { .. } | LogError::UnknownTopic { .. })
@@ -148,7 +148,7 @@ fn look(
     views: &mut Views,
     progress: &Progress,
 ) {
-    // Cut short by the user, the images behind the last frame are no loss.
+    // If the user limits the frames, images after the last frame are not lost.
     out.reading.wanted = expected_frames(&out.inspection);
     out.reading.in_log = out.reading.wanted;
     for number in 0..scope.frames {

@@ -259,7 +259,7 @@ fn placed(
             elsewhere += 1;
             continue;
         };
-        // Fractions of the sides of an image are smaller than a pixel, too.
+        // Boxes in fractions of the image size are also smaller than a pixel.
         if ![x, y].iter().all(|v| v.is_finite()) || !(1.0..1e6).contains(&width.min(height)) {
             empty += 1;
             continue;

@@ -136,7 +136,7 @@ fn boxes<'a, 'b>(node: &Node<'a, 'b>) -> impl Iterator<Item = Node<'a, 'b>> {
 
 /// Adds the boxes of a person in a video. CVAT also exports the boxes between key frames.
 fn track(node: &Node<'_, '_>, rows: &mut Vec<Row>) -> Result<(), String> {
-    // CVAT counts tracks from 0, and 0 is no number of a person.
+    // CVAT counts tracks from 0, which is not a valid ID of a person.
     let id = whole_number(node, "id", MOST_ID - 1)? + 1;
     for shape in boxes(node).filter(|shape| !is_set(shape, "outside")) {
         let key = shape.attribute("keyframe") != Some("0");

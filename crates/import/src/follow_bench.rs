@@ -56,7 +56,7 @@ fn read(path: &Path) -> Result<Scene, Failure> {
 /// # Errors
 /// A sentence with the cause.
 pub fn scene_of_follow_bench(text: &str, about: &str) -> Result<Scene, String> {
-    // An alias copies what its anchor names, and a few of them fill any memory.
+    // An alias copies the content of its anchor, so that a few nested ones can fill the memory.
     if text.contains('&') {
         return Err("it has YAML anchors, which the benchmark does not use; write them out".into());
     }
@@ -77,7 +77,7 @@ pub fn scene_of_follow_bench(text: &str, about: &str) -> Result<Scene, String> {
     for (number, obstacle) in listed(&root["obstacle"], "obstacle")?.iter().enumerate() {
         scene.blocks.push(block(obstacle, &format!("obstacle {number}"), offset_m)?);
     }
-    // The rules of scenes hold for read ones, too.
+    // Imported scenes must also satisfy the rules of scenes.
     let text = toml::to_string(&scene).map_err(|error| error.to_string())?;
     Scene::parse(&text).map_err(|error| error.to_string())
 }

@@ -179,7 +179,7 @@ fn table(bag: &Bag, args: &ImportArgs) -> Result<(String, usize), Failure> {
             let why = "an annotation before the first scan; is --scan the annotated topic?";
             return Err(Failure::failed(format!("{}: {why}", args.path.display())));
         };
-        // A person who was annotated again is where the last click was.
+        // If a person was annotated twice, the last annotation counts.
         rows.insert((number, *id), *at_m);
     }
     let mut out = "stamp_s,scan,id,x_laser_m,y_laser_m,points,ignore,source\n".to_owned();

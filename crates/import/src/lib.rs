@@ -72,7 +72,7 @@ pub fn import(args: &ImportArgs) -> Outcome {
     let sequence = read(args)?;
     make_room_for(&log)?;
     writer::write(&sequence, &log, &signals).inspect_err(|_| {
-        // A log without its end would pass for the whole sequence.
+        // An incomplete log would be taken for the complete sequence.
         let _ = std::fs::remove_file(&log);
     })?;
     beside(&sequence, &log)?;

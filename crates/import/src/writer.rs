@@ -31,7 +31,7 @@ pub fn write(sequence: &Sequence, path: &Path, signals: &Signals) -> Result<(), 
     }
     let mut places = sequence.placed.iter().peekable();
     for moment in sequence.moments.iter().take_while(|_| signals.received().is_none()) {
-        // A pose goes before the image that it is for.
+        // A pose is written before its image.
         while let Some(placed) = places.next_if(|placed| placed.stamp <= moment.stamp) {
             place(&mut log, placed).map_err(Failure::failed)?;
         }

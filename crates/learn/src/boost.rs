@@ -286,7 +286,7 @@ mod tests {
             .map(|level| squared_error(&numbers, &truth, table.threshold(0, level - 1)))
             .fold(f64::MAX, f64::min);
         let error = squared_error(&numbers, &truth, tree[0].below);
-        // Samples of very little weight do not count, so it is not exactly the least.
+        // Samples with very little weight are ignored, so it is not exactly the least.
         assert!(error < least + 0.01, "{error} {least}");
     }
 

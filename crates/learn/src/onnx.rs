@@ -115,7 +115,7 @@ impl OnnxGraph {
         let weights = format!("{output}.weights");
         let bias = format!("{output}.bias");
         let mut turned = Vec::with_capacity(conv.weights.len());
-        // A file has the weights by output, by input, by tap.
+        // A file has the weights in the order output, input, tap.
         for out in 0..OUT {
             for input in 0..IN {
                 turned.extend(

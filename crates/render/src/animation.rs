@@ -49,7 +49,7 @@ impl Animation {
             }
             let mut frame = Frame::from_rgba_speed(width, height, &mut part, QUANTISING_SPEED);
             frame.delay = u16::try_from(self.delay_ms / 10).unwrap_or(u16::MAX);
-            // Pixels that a later picture leaves transparent stay as they are.
+            // Pixels that are transparent in a later picture do not change.
             frame.dispose = DisposalMethod::Keep;
             encoder.write_frame(&frame).map_err(|error| cannot_write(to, &error))?;
         }

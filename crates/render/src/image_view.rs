@@ -219,7 +219,7 @@ impl ImageView {
             for head in &trail {
                 match scene.camera.project(head) {
                     Some(pixel) => piece.push(self.pixel(&pixel)),
-                    // A line across the part out of view would cut through the picture.
+                    // A line across the part outside of the view would cross the picture.
                     None => self.draw_trail(&mut piece, id),
                 }
             }

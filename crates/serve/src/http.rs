@@ -123,7 +123,7 @@ impl Incoming {
     /// # Errors
     /// The answer that refuses the request.
     pub fn take(&mut self, part: &[u8], body_bytes: usize) -> Result<Option<Request>, Response> {
-        // The end of the head may lie across the seam.
+        // The end of the head may be split over two parts.
         let searched = self.bytes.len().saturating_sub(HEAD_END.len() - 1);
         self.bytes.extend_from_slice(part);
         if self.head.is_none() {
@@ -180,7 +180,7 @@ fn parse_head(bytes: &[u8]) -> Result<Request, Response> {
             return Err(wrong("a header has a name or a value that is none"));
         }
         let name = name.to_ascii_lowercase();
-        // Two of them could be read in two ways.
+        // Two such headers would be ambiguous.
         let is_single = matches!(name.as_str(), "host" | "content-length" | "origin");
         if is_single && headers.iter().any(|(other, _)| *other == name) {
             return Err(wrong("a header is there twice"));
@@ -200,7 +200,7 @@ fn body_length(request: &Request, most: usize) -> Result<usize, Response> {
         return Err(Response::refusal(411, "send the length of the body"));
     }
     let Some(text) = request.header("content-length") else { return Ok(0) };
-    // `parse` alone would take a plus sign.
+    // `parse` alone would accept a plus sign.
     let is_number = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
     if !is_number {
         return Err(Response::refusal(400, "the length of the body is no number"));

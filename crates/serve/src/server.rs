@@ -176,7 +176,7 @@ impl Guard {
         }
         let is_change = request.method == "POST";
         let needs_origin = is_change && self.changes != Changes::FromPrograms;
-        // Where a browser speaks, the page must be the one of this very address.
+        // If a browser sends the request, its page must have exactly this address.
         let is_foreign = match request.header("origin") {
             Some(origin) => origin.strip_prefix("http://") != Some(host),
             None => needs_origin,

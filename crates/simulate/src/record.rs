@@ -153,7 +153,7 @@ impl Recorder {
             self.colour("/camera/color", recorded, &header, colour)?;
         }
         if let Some(depth) = &images.depth {
-            // Depth has a capture time of its own, and cannot be recorded before it.
+            // Depth has its own capture time, and cannot be recorded before it.
             let offset_ns = shot.depth_ns.saturating_sub(shot.stamp_ns);
             let recorded = recorded.max(log_stamp(shot.captured_ns + offset_ns));
             let header = Header::new(log_stamp(shot.depth_ns), CAMERA_FRAME);

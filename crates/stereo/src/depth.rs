@@ -247,7 +247,7 @@ fn to_depth(row: &mut [f32], focal_baseline: f32, range: &RangeInclusive<f32>) -
     for depth in row {
         let metres = focal_baseline / *depth;
         let inside = (metres >= nearest) & (metres <= farthest);
-        // A sum with an overflow check is no vector instruction.
+        // A sum with an overflow check cannot be vectorised.
         out = out.wrapping_add(u32::from(!inside & !metres.is_nan()));
         *depth = if inside { metres } else { f32::NAN };
     }

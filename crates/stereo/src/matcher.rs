@@ -120,7 +120,7 @@ impl Matcher {
     }
 
     fn fill(&mut self, left: &GreyImage, right: &GreyImage, max_disparity: usize) -> Result<()> {
-        // One instance per power of two: loops of fixed length become vector instructions.
+        // One instance per power of two, because loops of fixed length are vectorised.
         let run = match max_disparity {
             0..16 => Self::run::<16>,
             16..32 => Self::run::<32>,

@@ -199,7 +199,8 @@ fn between(
     let slope = &mut slope[..width];
     let level = &mut level[..width];
     let last = (width - 1) as f32;
-    // The columns first, without access to the images: this loop becomes vector instructions.
+    // The columns are computed first, without access to the images, so that this loop is
+    // vectorised.
     for x in 0..width {
         let at = (x as i32 as f32 - disparities[x]).clamp(0.0, last);
         columns[x] = (at.floor() + WHOLE).to_bits() & LAST_BITS;

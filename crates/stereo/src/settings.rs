@@ -82,7 +82,7 @@ settings! {
 pub const MAX_DISPARITIES: usize = 256;
 
 impl StereoSettings {
-    /// Returns the settings for at most so many threads, 1 at least.
+    /// Returns the settings with at most this number of threads, but at least 1.
     #[must_use]
     pub fn on_threads(&self, most: usize) -> Self {
         let own = if self.threads == 0 { most } else { self.threads };

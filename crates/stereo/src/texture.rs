@@ -125,7 +125,7 @@ fn limit(row: &mut [f32], before: &[f32], behind: &[f32]) -> u32 {
     for (x, value) in row.iter_mut().enumerate() {
         let expected = expected(before[x], behind[x]);
         let stays = (*value - expected).abs() <= tolerance(expected);
-        // A sum with an overflow check is no vector instruction.
+        // A sum with an overflow check cannot be vectorised.
         dropped = u32::wrapping_add(dropped, u32::from(!stays & !value.is_nan()));
         *value = if stays { *value } else { f32::NAN };
     }

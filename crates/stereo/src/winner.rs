@@ -214,7 +214,7 @@ fn judge(winners: &Winners, uniqueness: f32, found: &mut RowWinners<'_>) -> Refu
         let ahead = f32::from(second[x].saturating_sub(cost[x]));
         let outside = u32::from(d) > x as u32;
         let not_unique = !outside & (ahead < uniqueness * rival);
-        // A sum that may overflow is no vector instruction.
+        // A sum with an overflow check cannot be vectorised.
         outside_count = outside_count.wrapping_add(u32::from(outside));
         not_unique_count = not_unique_count.wrapping_add(u32::from(not_unique));
         let value = f32::from(d) + offset(below[x].into(), cost[x].into(), above[x].into());

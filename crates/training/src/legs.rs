@@ -130,7 +130,7 @@ fn add_bag(bag: &Path, quick: bool, trainer: &mut dyn Trainer) -> Result<usize, 
     });
     let name = bag.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     for scan in &scans {
-        // Scanners that look elsewhere see other things, so each topic is a group.
+        // Scanners with different fields of view see different objects, so each topic is a group.
         let group = fingerprint(&format!("{name} {}", scan.topic));
         add_scan(scan, group, trainer)?;
     }

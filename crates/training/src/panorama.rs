@@ -95,7 +95,7 @@ fn card(args: &TrainArgs, rooms: &[Room], figures: &toml::Table) -> String {
 fn show(session: &Session<'_>, room: &Room, trainer: &mut dyn Trainer) -> Result<(), Failure> {
     let scene = room.scene()?;
     session.bar.set_length((scene.duration_s * scene.camera.rate_hz) as u64);
-    // Each room has its own range of group numbers, because ids of people begin anew.
+    // Each room has its own range of group numbers, because the IDs of people start again.
     let first = if room.seed == session.args.seed { 0 } else { STRANGER * (1 + room.seed) };
     let mut draw = Draw::new(&scene, threads(None));
     while let Some(simulated) = draw.next_frame() {

@@ -275,7 +275,7 @@ impl Photo {
             }
             Kind::Bust => vec![Rect::new(0.0, 0.0, width, height).inflated(-0.08)],
             Kind::Nobody => {
-                // Other squares in each round, but the same ones in each run.
+                // The squares differ between rounds, but not between runs.
                 let mut chance = SplitMix64::new(self.group ^ round);
                 let least = width.min(height).min(40.0);
                 let most = (0.6 * width.min(height)).max(least);

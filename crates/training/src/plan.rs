@@ -30,7 +30,8 @@ impl Plan {
             Self {
                 scenes: [scenes.unwrap_or(256), 64],
                 rounds: rounds.unwrap_or(2),
-                // Given scenes last as long as they say, mostly longer than these rooms.
+                // Given scenes have their own duration, which is mostly longer than that of these
+                // rooms.
                 test_scenes: if args.world.is_empty() { 36 } else { 8 },
                 look,
                 test_look,

@@ -50,7 +50,7 @@ impl<'a> Session<'a> {
     /// Settings that cannot be read: exit code 2.
     pub fn new(args: &'a TrainArgs, registry: &'a Registry) -> Result<Self, Failure> {
         let model = args.output.clone().unwrap_or_else(|| {
-            // A cascade is a file of OpenCV's kind.
+            // A cascade is a file in OpenCV's format.
             let is_cascade = registry.training_offer(&args.plugin).data == TrainingData::Faces;
             let kind = if is_cascade { "xml" } else { "toml" };
             Path::new("configs/models").join(&args.plugin).with_extension(kind)
@@ -147,7 +147,8 @@ impl<'a> Session<'a> {
                 let log_odds = verifier.log_odds(frame, candidate).map_err(Failure::failed)?;
                 let right = if example.is_person { log_odds } else { -log_odds };
                 counts.mistakes += u64::from(right < 0.0);
-                // Only mistakes and unsure cases are added: the model is right about the rest.
+                // Only mistakes and uncertain cases are added, because the model is right about the
+                // rest.
                 if right >= UNSURE {
                     return Ok(());
                 }

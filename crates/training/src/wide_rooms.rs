@@ -93,7 +93,7 @@ pub fn wide_scene(split: Split, number: u64, look: ImageTiming) -> Result<Scene,
 fn camera(chance: &mut SplitMix64) -> CameraSettings {
     let highest = chance.pick(&[1.3, 2.5]);
     let height_m = chance.between(0.3, highest);
-    // High cameras look down, those near the floor rather up.
+    // High cameras look down, and those near the floor look up.
     let pitch = match height_m {
         m if m < 0.8 => [-12.0, 8.0],
         m if m < 1.5 => [-4.0, 10.0],

@@ -49,7 +49,7 @@ pub fn run_data(run: &Recording, stamps: &[u64], remedies: &Remedies) -> RunData
     let times = times(stamps);
     let mut events = events::of_run(&times, &moments);
     events.extend(fault_events(&run.report.faults, &times));
-    // A fault comes before what follows from it in the same frame.
+    // A fault comes before its consequences in the same frame.
     events.sort_by_key(|event| (event.i, event.kind != FAULT));
     RunData {
         name: run.config_name(),
@@ -72,7 +72,7 @@ fn fault_events(faults: &[FaultFacts], times: &[f64]) -> Vec<EventData> {
     for fault in faults {
         let ends = fault.to_s.map(|to_s| (to_s, "ends"));
         for (at_s, verb) in std::iter::once((fault.from_s, "begins")).chain(ends) {
-            // The first frame that it may change.
+            // The first frame that the fault may change.
             if let Some(i) = times.iter().position(|t_s| *t_s >= at_s) {
                 let text = format!("The injected fault {} {verb}.", fault.kind);
                 events.push(EventData { i, kind: FAULT, text, ..EventData::default() });

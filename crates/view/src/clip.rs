@@ -53,7 +53,8 @@ fn paced(times_s: &[f64], fps: u32) -> Vec<usize> {
         // Times are rounded to a millisecond.
         if *time_s + 1e-3 >= due_s {
             out.push(at);
-            // From the time that was due, so that rates which do not divide each other keep the pace.
+            // Counted from the due time, so that the mean rate is kept if one rate is not a
+            // multiple of the other.
             due_s = if due_s.is_finite() { due_s } else { *time_s };
             due_s = (due_s + 1.0 / f64::from(fps)).max(*time_s);
         }

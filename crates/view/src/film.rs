@@ -52,7 +52,7 @@ pub fn open(run: &Recording, asked: Option<&Path>) -> Result<Result<FrameSource,
         )));
     };
     let outer = outer_settings(run);
-    // The right image adds nothing but the time to decode it.
+    // The right image is not shown, and decoding it would take time.
     let inputs = Inputs::ANY.without(Input::Right);
     let source = FrameSource::open(&path, &outer.input, &outer.limits, inputs);
     let shown = path.display();
@@ -86,8 +86,8 @@ fn outer_settings(run: &Recording) -> OuterSettings {
     let tables = run.config.iter().filter(|(key, _)| own.contains(&key.as_str()));
     let tables = tables.map(|(key, value)| (key.clone(), value.clone())).collect();
     let mut outer: OuterSettings = toml::Value::Table(tables).try_into().unwrap_or_default();
-    // The topics of `[input]` are those of the real robot; a ride did not read its log by them, and the
-    // simulator writes its own.
+    // The topics of `[input]` are those of the real robot; a ride does not read its log with them,
+    // because the simulator writes its own topics.
     if run.report.ride.is_some() {
         outer.input = InputSettings::default();
     }
@@ -215,7 +215,7 @@ mod tests {
         let mut frames = vec![frame([4.0, 0.0]), None, frame([4.0, 0.5])];
         add_trails_at(&mut frames, 0..2, &camera(), &Isometry2::identity());
         assert_eq!(frames[2].as_ref().unwrap().tracks[0].trail, [320, 240], "straight ahead");
-        // Turned to the left, the place is to the right in the image.
+        // After a turn to the left, the position is to the right in the image.
         let turned = Isometry2::new(Vector2::zeros(), 0.1);
         add_trails_at(&mut frames, 0..2, &camera(), &turned);
         assert_eq!(frames[2].as_ref().unwrap().tracks[0].trail, [370, 240]);

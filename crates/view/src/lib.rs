@@ -154,7 +154,7 @@ pub fn view(args: &ViewArgs, registry: &Registry) -> Outcome {
     let args = ViewArgs { run: rides::run_of(&args.run), ..args.clone() };
     let output = args.output.clone().unwrap_or_else(|| args.run.join(PAGE));
     let runs = args.recordings()?;
-    // The page in the folder of a run is made from that folder, and made anew each time.
+    // The page in the folder of a run only depends on that folder, and may be overwritten.
     if args.output.is_some() {
         spare(&output, args.overwrite)?;
     }
@@ -300,7 +300,7 @@ fn add_log(
         for (run, recording) in data.runs.iter_mut().zip(runs) {
             let witness = witness(recording, stamps, &film.depths);
             let rules = Rules { remedies, config: &recording.config };
-            // Contradictions are those of the truth: the page is of use without it.
+            // A contradiction is a fault of the truth, without which the page is still useful.
             if let Err(why) = truth.judge(&data.t, data.image_px, run, (&witness, rules)) {
                 notes.push(format!("{} is not compared with the truth: {why}", run.name));
             }

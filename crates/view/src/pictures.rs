@@ -31,7 +31,7 @@ impl Pictures {
     /// Adds the image of a frame, with the best quality that the limit allows.
     pub fn add(&mut self, at: usize, image: &RgbImage) {
         let mut text = encode(image, LEVELS[self.level]);
-        // Levels go down for all later images, so that neighbours look alike.
+        // The level is lowered for all later images, so that consecutive images look alike.
         while text.len() > self.share && self.level + 1 < LEVELS.len() {
             self.level += 1;
             text = encode(image, LEVELS[self.level]);

@@ -128,7 +128,8 @@ fn worse_first(a: &RideFacts, b: &RideFacts) -> std::cmp::Ordering {
 
 impl Ride {
     fn folder(&self, parent: &Path) -> Result<&str, Failure> {
-        // A name, and no way out of the folder: the results may come from elsewhere.
+        // Only a plain name, not a path out of the folder, because the results may come from
+        // elsewhere.
         let name = self
             .folder
             .as_deref()

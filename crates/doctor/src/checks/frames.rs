@@ -32,7 +32,7 @@ pub fn frames(evidence: &Evidence) -> Option<Finding> {
     }
     let pitch = camera.pitch_down_rad().to_degrees();
     let roll = camera.roll_rad().to_degrees();
-    // A body frame in place of the optical one turns the camera by 90 degrees, far beyond these
+    // A body frame instead of the optical one turns the camera by 90 degrees, far beyond these
     // limits.
     let upright = pitch.abs() <= 65.0 && roll.abs() <= 45.0;
     if upright || camera.panorama().is_some() {

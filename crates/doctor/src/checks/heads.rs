@@ -23,7 +23,7 @@ const FAR_M: f64 = 4.0;
 /// Checks at which distances heads are in the image, from the height, pitch and lens of the camera.
 pub fn heads(evidence: &Evidence) -> Option<Finding> {
     let camera = evidence.samples.camera.as_ref()?;
-    // A mirror looks all around, and a height that is unknown tells nothing.
+    // A mirror sees all around, and an unknown height gives no information.
     if camera.panorama().is_some() || camera.is_blind() || camera.height_m() <= 0.0 {
         return None;
     }

@@ -20,7 +20,7 @@ pub fn laser(evidence: &Evidence) -> Option<Finding> {
     let rate = rate.map_or_else(|| "one scan".to_owned(), |hz| format!("{hz:.1} scans a second"));
     let step_deg = scans.increment_rad.to_degrees();
     let valid = scans.valid();
-    // A scanner outdoors sees the sky in most directions, which is no fault.
+    // Outdoors a scanner has no reflection in most directions, which is not a fault.
     let severity = Severity::beyond(1.0 - valid, 0.8, 0.97);
     let mut measured = format!(
         "{topic}: {rate}, {} rays over {:.0} degrees ({step_deg:.2} each), readings in {:.0} % up to \
@@ -30,7 +30,7 @@ pub fn laser(evidence: &Evidence) -> Option<Finding> {
         100.0 * valid,
         scans.farthest_m
     );
-    // At a height of zero tf gives the place on the floor and not the height.
+    // At a height of zero, tf only has the position on the floor and not the height.
     if scans.height_m > 0.0 {
         measured += &format!(", {:.2} m above the floor", scans.height_m);
     }

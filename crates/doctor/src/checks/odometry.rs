@@ -29,7 +29,7 @@ pub fn odometry(evidence: &Evidence) -> Option<Finding> {
     let source = evidence.inspection.facts.odometry_topic.as_deref();
     let (severity, measured) = match (source, gaps + jumps) {
         (_, 1..) => (Severity::Warn, unsteady(gaps, jumps, &way, stands)),
-        // Readings in a wrong unit are beyond the walls, or between floor and ceiling at random.
+        // Readings in a wrong unit are behind the walls, or anywhere between floor and ceiling.
         _ if all_moves && is_unit_in_doubt(evidence) => {
             let measured =
                 "not known: the unit of depth is in doubt, by which a camera that moves is told";
@@ -56,7 +56,8 @@ pub fn odometry(evidence: &Evidence) -> Option<Finding> {
         }
         (None, _) => match evidence.changed {
             Some(_) => (Severity::Ok, "none, and the camera stands still".to_owned()),
-            // A scanner alone cannot tell, so nothing is said about how right that is.
+            // With only a scanner this cannot be measured, so there is no statement on its
+            // accuracy.
             None => (
                 Severity::Unknown,
                 "none: the robot is taken to stand still; if it drives, record its odometry"

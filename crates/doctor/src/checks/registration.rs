@@ -24,8 +24,8 @@ pub fn registration(evidence: &Evidence) -> Option<Finding> {
     let error = offset.error_px[0].hypot(offset.error_px[1]);
     let off = f64::from(dx).hypot(f64::from(dy));
     let scale = (camera.width as f64 / USUAL_COLUMNS).clamp(0.5, 2.0);
-    // An offset near its own error is no evidence of a misregistration: outlines of the floor may
-    // have any offset along them, before a camera near it.
+    // An offset near its own error is not evidence of a misregistration: with a camera near the
+    // floor, outlines of the floor may have any offset along them.
     if offset.contrast < 0.25 || error > SURE * off.max(16.0 * scale) {
         let measured = format!(
             "outlines in depth and colour do not tell ({dx:+}, {dy:+} px, give or take {error:.1})"

@@ -8,7 +8,8 @@ pub fn skew(evidence: &Evidence) -> Option<Finding> {
     let [colour, depth] = [&facts.colour_topic, &facts.depth_topic].map(|topic| {
         topic.as_ref().and_then(|t| evidence.inspection.topic(t)).map_or(0, |t| t.count)
     });
-    // A slower depth camera cannot pair with every colour image, which is no fault of the stamps.
+    // A slower depth camera cannot pair with every colour image, which is not a fault of the
+    // stamps.
     let possible = (depth as f64 / colour.max(1) as f64).min(1.0);
     let share = skew.paired / possible.max(1e-9);
     let late = skew.median_s.abs();

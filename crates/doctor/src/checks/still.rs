@@ -24,7 +24,7 @@ pub fn still(evidence: &Evidence) -> Option<Finding> {
     let still_share = coverage.still_boxes as f64 / coverage.boxes as f64;
     let idle_share = coverage.idle();
     let mut severity = Severity::beyond(idle_share, IDLE.0, IDLE.1);
-    // Of tracks that live too briefly to be judged, nothing is certain.
+    // Tracks that are too short to be judged prove nothing.
     let are_judged = coverage.moving + coverage.still > 0;
     if coverage.boxes < FEW_BOXES || !are_judged {
         severity = severity.min(Severity::Warn);

@@ -118,8 +118,8 @@ fn middle_place(part: &[(Stamp, Placed)]) -> Point2<f64> {
 fn life(seen: &[(Stamp, Placed)]) -> Life {
     let noise_m = MOVED_M + MOVED_GROWTH * middle(seen, |placed| placed.range_m);
     let home = middle_place(seen);
-    // The median of three frames in a row: a single wild detection is no motion. Short tracks of
-    // slow cameras have no frames to spare.
+    // The median of three frames in a row, so that a single outlier is not taken for motion. Short
+    // tracks of slow cameras have too few frames for this.
     let length = if seen.len() < SHORT { 1 } else { 3 };
     let farthest =
         seen.windows(length).map(|part| (middle_place(part) - home).norm()).fold(0.0, f64::max);

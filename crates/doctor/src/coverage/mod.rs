@@ -84,7 +84,7 @@ impl Coverage {
             missed.extend(seen.map(|seen| (out.add_blobs(moment, seen), moment.index)));
         }
         missed.retain(|(count, _)| *count > 0);
-        // Stable: of equal ones the earlier frame comes first.
+        // The sort is stable: of equal frames the earlier one comes first.
         missed.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
         out.frames_unexplained = missed.len();
         out.missed_frames = missed.into_iter().map(|(_, index)| index).collect();

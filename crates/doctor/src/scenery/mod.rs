@@ -204,7 +204,8 @@ mod tests {
     #[test]
     fn things_of_another_size_are_no_people() {
         for (width_m, top_m) in [(1.6, 1.7), (0.1, 1.7), (0.5, 0.9)] {
-            // Fast, because the middle of a slow wide board hides the wall nearly all the time.
+            // The board is fast, because the middle of a slow wide board hides the wall nearly all
+            // the time.
             let start = Point2::new(3.0, 4.0);
             let thing = Thing { start, speed_mps: 2.0, width_m, top_m };
             let scenery = Room::default().with(thing).seen(40, 0.0).judge();

@@ -153,7 +153,7 @@ fn nearest(depth: &[f32], columns: usize, rows: usize) -> Vec<f32> {
     let smallest = (0..depth.len()).map(|at| {
         let xs = around(at % columns, columns);
         let cells = around(at / columns, rows).flat_map(|y| xs.clone().map(move |x| (x, y)));
-        // `min` passes over NaN, which is no reading.
+        // `min` ignores NaN, which means no reading.
         cells.map(|(x, y)| depth[y * columns + x]).fold(f32::INFINITY, f32::min)
     });
     smallest.collect()

@@ -94,7 +94,8 @@ impl<S: Site> Connections<S> {
                             | ErrorKind::Interrupted
                             | ErrorKind::ConnectionAborted
                     );
-                    // The process has no more files: a slow client gives its one up.
+                    // The process has no more file descriptors, so that the connection of a slow
+                    // client is closed.
                     return count > 0 || !is_passing && self.close_oldest();
                 }
             }
@@ -164,7 +165,7 @@ impl<S: Site> Connections<S> {
         let left =
             if started.is_ok() { hand_over.send(job).map_err(|unsent| unsent.0) } else { Err(job) };
         if let Err(job) = left {
-            // A mistake of the site must not end the server.
+            // A panic of the site must not end the server.
             let _ = catch_unwind(AssertUnwindSafe(|| job.run()));
         }
     }
@@ -196,7 +197,7 @@ impl<S: Site> Job<S> {
         let mut connection = Connection::new(stream, Work::Writing { bytes, sent: 0 });
         // Most answers fit into the buffers of the system.
         if connection.go_on(Instant::now(), &desk.guard) != Step::Ends {
-            // A server that has ended sends no more.
+            // A server that has ended sends nothing more.
             let _ = desk.unsent.send(connection);
         }
     }
@@ -325,7 +326,7 @@ impl Connection {
         let mut step = Step::Waits;
         while *sent < bytes.len() {
             match self.stream.write(&bytes[*sent..]) {
-                // A browser that is gone needs no answer.
+                // A browser that has disconnected needs no answer.
                 Ok(0) => return Step::Ends,
                 Ok(count) => {
                     *sent += count;

@@ -103,7 +103,7 @@ impl Live {
         self.newest.end("The run has ended.");
         self.stop.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
-            // A panic of the server is none of the run.
+            // A panic of the server does not affect the run.
             let _ = thread.join();
         }
     }

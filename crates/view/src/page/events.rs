@@ -117,7 +117,7 @@ impl Watch {
     /// that comes and goes from frame to frame is reported once.
     fn compare_motion(&mut self, at: usize, t_s: f64, moment: &Moment) {
         let Some(drive) = &moment.notes.drive else { return };
-        // To stand at the distance to keep, or to begin, is no event.
+        // To stop at the distance to keep, or at the start, is not an event.
         let is_as_asked = matches!(drive.reason.as_str(), "follow" | "limited");
         let kind = match drive.motion.as_str() {
             "stands" if is_as_asked => return,
@@ -156,7 +156,7 @@ impl Watch {
         let course = self.courses.entry(id).or_insert_with(|| Course::begun(at, t_s));
         course.present = at;
         let since = *course.unseen_since.get_or_insert(at);
-        // A single frame without evidence is no event.
+        // A single frame without evidence is not an event.
         let is_lost = t_s - course.seen.1 >= LOST_AFTER_S;
         let newly_lost = is_lost && !std::mem::replace(&mut course.is_lost, is_lost);
         if is_new {

@@ -27,7 +27,7 @@ pub fn tests<'a>(
         let remedy = remedies.of_config(name, config);
         let settings = remedy.map_or_else(Vec::new, |remedy| remedy.lines(config));
         let why = remedies.sentence(name, config);
-        // The page compares stages alone.
+        // The page only compares stages.
         let stage = if is_telling(name) { 1 + remedies.stage(name, config) } else { 0 };
         tests.insert(name.to_owned(), TestData { settings, why, stage });
     }
@@ -182,7 +182,7 @@ pub fn add_trails(
 ) {
     for track in frame.tracks.iter_mut().filter(|track| track.state == "seen") {
         let heads = past.iter().filter_map(|frame| frame.tracks.iter().find(|t| t.id == track.id));
-        // A predicted position is no place at which the person was.
+        // A trail has no predicted positions, where the person may never have been.
         let heads = heads.filter(|t| t.state == "seen");
         let heads = heads.map(|t| {
             let floor = odom_from_robot.inverse_transform_point(&Point2::from(t.at));

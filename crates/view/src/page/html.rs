@@ -49,7 +49,7 @@ pub fn html(heading: &Heading, data: &PageData) -> serde_json::Result<String> {
 /// # Errors
 /// Data that JSON cannot express.
 pub fn live_html(heading: &Heading, data: &PageData) -> serde_json::Result<String> {
-    // Without an icon of its own a browser would ask for one outside of the key.
+    // Without an icon in the page, a browser would request one outside of the key.
     let style = html! { link rel="icon" href="data:,"; link rel="stylesheet" href="page.css"; };
     let names = scripts().map(|(name, _)| name);
     let scripts = html! { @for name in names { script src=(name) {} } };
@@ -105,7 +105,7 @@ fn script_safe(json: &str) -> String {
     let mut out = String::with_capacity(json.len());
     for letter in json.chars() {
         match letter {
-            // The two separators are line ends in older scripts.
+            // Older versions of JavaScript treat the two separators as line ends.
             '<' | '>' | '&' | '\u{2028}' | '\u{2029}' => {
                 out += &format!("\\u{:04x}", u32::from(letter));
             }
