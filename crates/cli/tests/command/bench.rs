@@ -67,17 +67,17 @@ fn a_config_for_other_cameras_is_named_once_with_its_logs() {
     home.config("high", "[suits]\ncamera_height_m = [2.0, 3.0]\n");
     let output = home.bench(&["plan", "--logs-dir", "logs", "-o", "out"]);
     let said = text(&output.stderr);
-    let expected = "note: high is by its [suits] not made for long (the camera is 1.20 m high, and the \
-                    config is for 2 to 3 m), short (";
+    let expected = "note: high is not made for long (the camera is 1.20 m high, but the config is \
+                    for 2 to 3 m), short (";
     assert_eq!(said.matches(expected).count(), 1, "{said}");
-    assert_eq!(said.matches("is by its [suits]").count(), 1, "{said}");
+    assert_eq!(said.matches("according to its [suits]").count(), 1, "{said}");
     assert!(said.contains("6 tasks planned: 3 configs on 2 logs; --configs limits them"), "{said}");
     // Several have one line.
     home.config("higher", "[suits]\ncamera_height_m = [3.0, 4.0]\n");
     let output = home.bench(&["plan", "--logs-dir", "logs", "-o", "out"]);
     let said = text(&output.stderr);
-    let expected = "note: 2 configs are by their [suits] not made for some of the logs, where tracks are \
-                    worse: high (2 logs), higher (2 logs)";
+    let expected = "note: 2 configs are not made for some of the logs according to their [suits], \
+                    and track worse there: high (2 logs), higher (2 logs)";
     assert!(said.contains(expected) && said.matches("[suits]").count() == 1, "{said}");
 }
 

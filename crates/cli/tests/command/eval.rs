@@ -173,7 +173,11 @@ fn tracks_of_a_run_that_was_stopped_are_noted() {
         fs::write(&report, written).unwrap();
         let said =
             results_of(&in_home(folder.path(), &["--truth", "walk.people.csv", "--tracks", "out"]));
-        assert_eq!(said.contains("the run is not whole (stopped by signal 2)"), is_noted, "{said}");
+        assert_eq!(
+            said.contains("the run is incomplete (stopped by signal 2)"),
+            is_noted,
+            "{said}"
+        );
     }
 }
 
