@@ -297,7 +297,7 @@ mod tests {
     #[test]
     fn a_unit_by_the_median_alone_is_a_power_of_ten() {
         let told = unit_by_median(0.001, 350.0);
-        assert!(told.starts_with("[input] depth_unit_m = 0.00001\nwith which half"), "{told}");
-        assert!(told.contains("within 3.5 m; no floor is seen"), "{told}");
+        assert!(told.starts_with("[input] depth_unit_m = 0.00001\nwhich puts half"), "{told}");
+        assert!(told.contains("within 3.5 m; no floor is visible"), "{told}");
     }
 }
