@@ -78,7 +78,8 @@ impl Page<'_> {
             details class="print" open[constant.len() <= MOST_UNFOLDED] {
                 summary { "LAMR and AP mean nothing in " (counted(constant.len(), "task")) }
                 p {
-                    "Where the reports have fewer than " (FEW_SCORES) " different scores, no threshold tells sure reports from unsure ones; LAMR is left out: "
+                    "Where the reports have fewer than " (FEW_SCORES) " different scores, no \
+                     threshold separates reliable reports from unreliable ones; LAMR is left out: "
                     @for (i, t) in constant.iter().enumerate() { @if i > 0 { ", " } (t.pipeline) " on " (t.log) } "."
                 }
             }
