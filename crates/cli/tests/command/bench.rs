@@ -528,9 +528,9 @@ fn copies_of_one_log_are_no_independent_logs() {
         ok(command.output().unwrap());
     }
     let told = results_of(&home.bench(&["--logs-dir", "logs", "-o", "out"]));
-    assert!(told.contains("note: mirrored and short and twice go back to one recording"), "{told}");
+    assert!(told.contains("note: mirrored and short and twice come from one recording"), "{told}");
     let copies = serde_json::json!([["mirrored", "short", "twice"]]);
     assert_eq!(home.report("out")["copies"], copies);
     let page = fs::read_to_string(home.path("out/report.html")).unwrap();
-    assert!(page.contains("mirrored and short and twice go back to one recording"));
+    assert!(page.contains("mirrored and short and twice come from one recording"));
 }
