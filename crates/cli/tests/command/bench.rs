@@ -121,8 +121,8 @@ fn a_log_with_which_a_pipeline_was_made_is_noted_by_its_contents() {
     let said = text(&output.stdout);
     let json = home.report("out")["notes"].to_string();
     let page = fs::read_to_string(home.path("out/report.html")).expect("a report");
-    let note = "models or settings of depth-ekf were made with hall: figures there say little about another \
-                room";
+    let note = "models or settings of depth-ekf were fitted to hall: figures there say little \
+                about other rooms";
     for form in [&said, &json, &page] {
         assert_eq!(form.matches(note).count(), 1, "{form}");
     }
@@ -347,7 +347,7 @@ fn a_log_of_scans_alone_is_not_sent_to_annotate() {
         let output = home.bench(&[&["plan", "-o", "out"][..], &arguments].concat());
         let said = text(&output.stderr);
         assert!(said.contains("scans.mcap has no truth"), "{said}");
-        assert!(said.contains("give their places as NAME.people-floor.csv"), "{said}");
+        assert!(said.contains("give their positions as NAME.people-floor.csv"), "{said}");
         assert!(!said.contains("tagalong annotate"), "{said}");
     }
 }
