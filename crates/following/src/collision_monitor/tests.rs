@@ -343,6 +343,27 @@ fn a_scanner_that_looks_down_and_one_of_several_layers_meet_the_floor() {
     assert_eq!(speed_by(&LaserScan::of_points(points)), Allowance::FREE.most);
 }
 
+/// A program that leaves out the rays without a reflection gives a scan without any.
+#[test]
+fn a_scan_without_any_ray_is_no_free_way() {
+    fn allowed(no_return: NoReturn, has_depth: bool) -> Allowance {
+        let default = CollisionMonitorSettings::default();
+        let mut monitor = monitor_of(CollisionMonitorSettings { no_return, ..default });
+        for index in 0..20 {
+            let depth = has_depth.then(|| depth_at(index, 0.0, 0.0));
+            let nothing = LaserScan::of_points(Vec::new());
+            let frame = frame(index, EgoMotion::at_rest(0.1), depth, Some(nothing));
+            monitor.update(&frame, &frame.motion, &[], None);
+        }
+        monitor.allowance(AHEAD, 0.9, &BRAKING)
+    }
+
+    let alone = allowed(NoReturn::Unknown, false);
+    assert_eq!((alone.most, alone.stops), (0.0, Reason::Unknown));
+    assert_eq!(allowed(NoReturn::Unknown, true), Allowance::FREE, "a camera sees there");
+    assert_eq!(allowed(NoReturn::Free, false), Allowance::FREE, "in those words");
+}
+
 /// Between two scans the robot moves towards what the last one met; one ray may be dust, and what is
 /// high above is passed below.
 #[test]
