@@ -403,8 +403,9 @@ impl Bridge {
         if let Some(cause) = self.pipeline.fault().filter(|cause| Some(*cause) != known) {
             self.latch(cause, tell);
         }
-        // A robot with stale odometry must not move, but may do so again afterwards.
-        self.obey(!found.odom_stale);
+        // A robot with stale odometry must not move, but may again afterwards. One that is enabled has to
+        // wait for the next frame: commands that the base did not execute may be of full speed.
+        self.obey(is_driving);
         // Returned only now, so that the wheels are informed of a failed step.
         let report = report?;
         self.frames += 1;
