@@ -356,15 +356,16 @@ impl Bridge {
         let rivals = if self.options.follow_object.is_some() { 0 } else { rivals };
         if rivals > self.rivals {
             tell(&format!(
-                "{rivals} other publishers of commands on {command}: two drivers at one wheel; let one \
-                 of them publish elsewhere (`--command`) and a multiplexer choose"
+                "{rivals} other publishers of commands on {command}: the robot gets commands from \
+                 several nodes; let one of them publish elsewhere (`--command`), and let a \
+                 multiplexer choose"
             ));
         }
         self.rivals = rivals;
         if resets > 1 && self.resets <= 1 {
             tell(&format!(
-                "{resets} publishers on {reset}: no message on it counts; end all but one (`ros2 topic \
-                 info --verbose` names them)"
+                "{resets} publishers on {reset}: messages on it are ignored; end all but one \
+                 (`ros2 topic info --verbose` names them)"
             ));
         }
         self.resets = resets;
@@ -402,8 +403,9 @@ impl Bridge {
         if let Some(cause) = self.pipeline.fault().filter(|cause| Some(*cause) != known) {
             self.latch(cause, tell);
         }
-        // A robot with stale odometry must not move, but may do so again afterwards.
-        self.obey(!found.odom_stale);
+        // A robot with stale odometry must not move, but may again afterwards. One that is enabled has to
+        // wait for the next frame: commands that the base did not execute may be of full speed.
+        self.obey(is_driving);
         // Returned only now, so that the wheels are informed of a failed step.
         let report = report?;
         self.frames += 1;
@@ -473,7 +475,7 @@ impl Bridge {
         tell(&if most_mps.is_finite() {
             format!("speed limit: {most_mps:.2} m/s")
         } else {
-            "no speed limit beside that of the config".to_owned()
+            "no speed limit other than that of the config".to_owned()
         });
     }
 
@@ -508,8 +510,8 @@ impl Bridge {
         let went_back = back_s > 0.0;
         if went_back && !self.went_back {
             tell(&format!(
-                "the stamps of the images went back by {back_s:.1} s: the robot stands until they are \
-                 newer than before; restart the bridge if a simulation or a log has begun again"
+                "the stamps of the images went back by {back_s:.1} s: the robot stands until they \
+                 are newer than before; restart the bridge if a simulation or a log was restarted"
             ));
         }
         self.went_back = went_back;

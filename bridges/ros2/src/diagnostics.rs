@@ -182,7 +182,7 @@ impl Status {
             }
             _ if self.malformed > 0 => (WARN, "messages that do not decode".into()),
             Some(permission) if self.enable_publishers == 0 && !permission.is_granted() => {
-                (OK, format!("{}: nobody publishes the enable", permission.cause()))
+                (OK, format!("{}: no node publishes the enable", permission.cause()))
             }
             Some(permission) => (OK, permission.cause().into()),
             None => (OK, "tracks people".into()),
@@ -225,7 +225,7 @@ mod tests {
         for (status, level, message) in [
             (well, OK, "enabled"),
             (Status { permission: latched, ..well }, WARN, "switched off"),
-            (unheard, OK, "not enabled: nobody publishes the enable"),
+            (unheard, OK, "not enabled: no node publishes the enable"),
             (contested, ERROR, "2 publishers of the enable: end all but one"),
             (fault, ERROR, "fault: odometry jumped"),
             (missing, WARN, "no following server of Nav2"),

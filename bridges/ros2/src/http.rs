@@ -38,8 +38,8 @@ impl HttpServer {
     pub(crate) fn start(address: SocketAddr, desk: Desk) -> Result<Self, BridgeError> {
         // Any program that reaches the port can choose the person that the robot follows.
         if !address.ip().is_loopback() {
-            let why = "must be an address of this computer, as 127.0.0.1:8080; put a proxy with \
-                       authentication before it for others";
+            let why = "must be an address of this computer, such as 127.0.0.1:8080; for other \
+                       computers, put a proxy with authentication in front of it";
             return Err(BridgeError::Config(format!("--http {address}: {why}")));
         }
         let mut access = Access::at(address).with_changes(Changes::FromPrograms);

@@ -237,7 +237,7 @@ where
         let mut shared = lock(&self.shared);
         if is_unconfirmed && !shared.report.is_unconfirmed {
             shared.told.push(
-                "Nav2 does not confirm that it ends the goal: the robot may drive on; stop it by its \
+                "Nav2 does not confirm that it ends the goal: the robot may still drive; use its \
                  emergency stop"
                     .to_owned(),
             );
@@ -422,8 +422,8 @@ where
     fn hold(&self, sentence: String) -> Phase {
         lock(&self.shared).report.reason = Some(sentence.clone());
         self.tell(format!(
-            "{sentence}; the next goal comes when the enable is released and pressed, or when the \
-             person is found again"
+            "{sentence}; the next goal is sent when the enable is released and pressed, or when \
+             the person is found again"
         ));
         Phase::Held
     }

@@ -21,7 +21,7 @@ use crate::{BridgeError, ClockSource, ForecastFrame, Middleware};
     version,
     after_help = "Examples:
   tagalong-ros2 depth-ekf
-        tracks people, moves nothing (the config has no controller)
+        tracks people without commands (the config has no controller)
   tagalong-ros2 my-robot.toml --namespace /robot1 --domain 7
         follows a person; commands go to /robot1/cmd_vel
   tagalong-ros2 my-robot.toml --command cmd_vel_nav
@@ -263,8 +263,8 @@ impl Options {
 fn check_security(variable: impl Fn(&str) -> Option<String>) -> Result<(), BridgeError> {
     let is_enabled = variable("ROS_SECURITY_ENABLE").as_deref() == Some("true");
     if is_enabled && variable("ROS_SECURITY_STRATEGY").as_deref() == Some("Enforce") {
-        let words = "ROS_SECURITY_STRATEGY is Enforce, and this program has no DDS security; its README \
-                     says why, under Security";
+        let words = "ROS_SECURITY_STRATEGY is Enforce, but this program has no DDS security; its \
+                     README says why, under Security";
         return Err(BridgeError::Config(words.to_owned()));
     }
     Ok(())
@@ -278,9 +278,9 @@ fn check_discovery(variable: impl Fn(&str) -> Option<String>) -> Result<(), Brid
         return Ok(());
     }
     let words = format!(
-        "{DISCOVERY_SERVER} is `{server}`, and this program knows Simple Discovery alone: it would see no \
-         topic. Set the robot to Simple Discovery (on a TurtleBot 4 in `turtlebot4-setup`), restart its \
-         nodes, and unset {DISCOVERY_SERVER} for this program"
+        "{DISCOVERY_SERVER} is `{server}`, but this program supports Simple Discovery only, so it \
+         would see no topic. Set the robot to Simple Discovery (on a TurtleBot 4 in \
+         `turtlebot4-setup`), restart its nodes, and unset {DISCOVERY_SERVER} for this program"
     );
     Err(BridgeError::Config(words))
 }

@@ -172,7 +172,7 @@ impl Desk {
         let shared = self.lock();
         match shared.lifecycle {
             _ if shared.is_open => Ok(()),
-            "" | "active" => Err(Refusal::Busy("the topics of the robot are still waited for")),
+            "" | "active" => Err(Refusal::Busy("still waiting for the topics of the robot")),
             _ => Err(Refusal::Busy(NOT_ACTIVE)),
         }
     }
@@ -182,7 +182,7 @@ impl Desk {
         self.check_open()?;
         let (answer, answered) = sync_channel(1);
         self.requests.try_send(Request { verb, answer }).map_err(|error| match error {
-            TrySendError::Full(_) => Refusal::Busy("too many requests wait"),
+            TrySendError::Full(_) => Refusal::Busy("too many requests are waiting"),
             TrySendError::Disconnected(_) => Refusal::Busy("the bridge ends"),
         })?;
         match answered.recv_timeout(PATIENCE) {
@@ -244,7 +244,7 @@ mod tests {
     fn a_request_waits_for_the_pipeline_and_brings_its_answer_back() {
         let (desk, requests) = Desk::new();
         let before = desk.ask(Verb::Clear).unwrap_err();
-        assert_eq!(before.reason(), "the topics of the robot are still waited for");
+        assert_eq!(before.reason(), "still waiting for the topics of the robot");
         desk.open();
         let pipeline = thread::spawn(move || {
             let answers = [Ok(()), Err("no person".to_owned())];
@@ -280,7 +280,7 @@ mod tests {
         assert_eq!((status.permission, status.frames, status.lifecycle), (None, 0, "inactive"));
         desk.close("active");
         let waits = desk.ask(Verb::Clear).unwrap_err();
-        assert_eq!(waits.reason(), "the topics of the robot are still waited for");
+        assert_eq!(waits.reason(), "still waiting for the topics of the robot");
         assert_eq!(desk.health().reason.as_deref(), Some("no frame yet"));
         desk.open();
         desk.frame(None, 2);

@@ -155,7 +155,7 @@ pub fn spare(file: &Path, overwrite: bool) -> Result<(), Failure> {
 }
 
 /// Message after a signal ended the writing of a log.
-pub const CUT_SHORT: &str = "stopped; the log is whole, but ends early";
+pub const CUT_SHORT: &str = "stopped; the log is valid, but ends early";
 
 /// Returns a text without the characters that control a terminal, because names in a log may come
 /// from anywhere.

@@ -149,7 +149,8 @@ impl Steering {
     }
 
     /// Tells whether the base executes the commands from now on. Only then can they be compared with
-    /// the odometry: a base that does something else, or responds too late, is a fault.
+    /// the odometry: a base that does something else, or responds too late, is a fault. A base that begins
+    /// to execute them starts from rest.
     pub fn set_driving(&mut self, is_driving: bool) {
         self.limiter.set_driving(is_driving);
     }

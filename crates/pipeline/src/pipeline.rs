@@ -154,7 +154,8 @@ impl Pipeline {
 
     /// Tells whether the base executes the commands from now on; not at the start, because a log was
     /// driven by others. Only then can the commands be compared with the odometry: a base that does
-    /// something else (wheels that are stuck, another driver), or responds too late, is a fault.
+    /// something else (wheels that are stuck, another driver), or responds too late, is a fault. A base
+    /// that begins to execute the commands starts from rest, whatever they were before.
     pub fn set_driving(&mut self, is_driving: bool) {
         if let Some(steering) = &mut self.steering {
             steering.set_driving(is_driving);

@@ -19,9 +19,9 @@ pub(super) fn remedy(permission: Permission, enables: usize, options: &Options) 
              comes again"
         ),
         Permission::Latched(CONTESTED) => format!(
-            ": the robot stands, because two hands at one switch cannot stop each other; end all \
-             publishers on {enable} but one (`ros2 topic info --verbose` names them), then send a message \
-             on {reset}, and begin to send `true` on {enable}"
+            ": the robot stands, because with several publishers of the enable none of them can \
+             stop it; end all publishers on {enable} but one (`ros2 topic info --verbose` names \
+             them), then send a message on {reset}, and begin to send `true` on {enable}"
         ),
         Permission::Latched(_) => format!(
             ": the robot stands until a message on {reset}, after which `true` begins on {enable}"

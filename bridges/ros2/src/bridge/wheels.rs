@@ -46,8 +46,8 @@ pub(super) fn tell_untimely(gate: &Gate, what: &str, topic: &str, tell: &dyn Fn(
     let Some(age_s) = gate.take_untold() else { return };
     let state = if age_s > 0.0 { "old" } else { "ahead" };
     tell(&format!(
-        "a {what} on {topic} was {:.1} s {state} by the clock of its publisher: it does not count; if \
-         all are, synchronise the clocks of both machines",
+        "a {what} on {topic} was {:.1} s {state} by the clock of its publisher: it is ignored; if \
+         all of them are, synchronise the clocks of both machines",
         age_s.abs()
     ));
 }

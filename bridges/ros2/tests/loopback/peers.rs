@@ -300,6 +300,17 @@ impl<C: Command> Collected<C> {
         self.so_far().iter().any(|(at, command)| *at > then && speeds(command) != [0.0, 0.0])
     }
 
+    /// Returns the speed ahead of the first command since then that moves the robot, m/s; 0 without
+    /// one.
+    pub(crate) fn first_speed_since(&self, then: Instant) -> f64 {
+        for (at, command) in self.so_far() {
+            if at > then && speeds(&command) != [0.0, 0.0] {
+                return command.twist().linear.x;
+            }
+        }
+        0.0
+    }
+
     /// Waits until a command moves the robot.
     pub(crate) fn wait_for_move(&self, why: &str) {
         let from = Instant::now();

@@ -102,7 +102,7 @@ struct Contestant {
     settings: Vec<(Vec<toml::Value>, Contender)>,
     /// Number of settings among which the sequences choose.
     candidates: usize,
-    /// How they were searched.
+    /// Method of the search.
     search: Search,
     /// Index of the settings of the config, which are a candidate only by chance.
     shipped: usize,
@@ -340,7 +340,7 @@ fn drop_doubled_ids(sequences: &mut [GivenSequence]) {
         if dropped > 0 {
             let name = &sequence.info.name;
             say(&format!(
-                "note: {name}: {dropped} people are left out, whose ID the frame has already"
+                "note: {name}: {dropped} people are left out, because the frame has their ID already"
             ));
         }
     }

@@ -42,7 +42,7 @@ struct About {
 #[derive(Default, Serialize)]
 pub struct Fitted {
     pub name: String,
-    /// How settings were searched.
+    /// Method of the search for settings.
     search: Search,
     /// Number of settings among which the rooms chose.
     settings: usize,
@@ -470,7 +470,7 @@ impl Fitted {
             }
         }];
         notes.extend(self.spread(seed));
-        notes.extend(self.too_few.as_ref().map(|why| format!("Nothing to say: it {why}.")));
+        notes.extend(self.too_few.as_ref().map(|why| format!("No figures: it {why}.")));
         let mut chosen: BTreeMap<String, Vec<&str>> = BTreeMap::new();
         for InRoom { room, chosen_without, .. } in &self.rooms {
             chosen.entry(self.changes(chosen_without)).or_default().push(room);

@@ -142,6 +142,8 @@ pub(crate) struct CommandLimiter {
     /// Time of the last command.
     made: Instant,
     response: ResponseCheck,
+    /// True while the base executes the commands.
+    is_driving: bool,
     /// Time from an image to wheels that move accordingly, s: the set one, or the measured one if that
     /// is longer.
     reaction_s: f64,
@@ -183,6 +185,7 @@ impl CommandLimiter {
             fault: None,
             made: Instant::now(),
             response: ResponseCheck::default(),
+            is_driving: false,
             late: None,
             is_odometry_old: false,
         }
@@ -262,8 +265,13 @@ impl CommandLimiter {
         }
     }
 
-    /// Tells whether the base executes the commands: only then are they compared with the odometry.
+    /// Tells whether the base executes the commands: only then are they compared with the odometry. A
+    /// base that begins to execute them starts from rest, whatever the commands before were.
     pub(crate) fn set_driving(&mut self, is_driving: bool) {
+        if is_driving && !self.is_driving {
+            self.motion = Motion::default();
+        }
+        self.is_driving = is_driving;
         self.response.set_driving(is_driving && self.settings.check_response);
     }
 

@@ -132,6 +132,20 @@ fn speed_grows_no_faster_than_it_may() {
     assert!((slower - (0.8 - 1.0 * PERIOD_S)).abs() < 1e-9, "{slower}");
 }
 
+/// Before the enable no command is executed, however fast they are.
+#[test]
+fn a_base_that_begins_to_execute_the_commands_starts_from_rest() {
+    let (mut limiter, unheard) = at_speed(0.8, 0.8);
+    assert!(unheard.wheels.left > 0.79, "{unheard:?}");
+    let mut before = 0.0;
+    for frame in 40..45 {
+        limiter.set_driving(true);
+        let speed = limiter.limit(&wish(frame, 0.8, 0.8), free).wheels.left;
+        assert!((speed - before - 0.5 * PERIOD_S).abs() < 1e-9, "{frame}: {before} {speed}");
+        before = speed;
+    }
+}
+
 #[test]
 fn each_emergency_stops_at_once() {
     type Change = fn(Wish) -> Wish;
