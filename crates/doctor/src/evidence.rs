@@ -34,6 +34,10 @@ pub struct Evidence {
     pub config: String,
     /// Contents of the log.
     pub inspection: Inspection,
+    /// Remarks of the reader on what was lost.
+    pub losses: Vec<String>,
+    /// Remarks of the reader on images that make no frame although nothing was lost.
+    pub frameless: Vec<String>,
     /// Reason for which the pipeline lacks an input that it requires.
     pub refusal: Option<LogError>,
     /// Source that the controller lacks.

@@ -230,6 +230,9 @@ fn what_was_broken_is_found() {
 fn a_good_log_is_let_go() {
     let (code, said) = doctor(&config(), good(), &[]);
     assert_eq!((code, complaints(&said)), (0, Vec::new()), "{said:#}");
+    // Of topics that are not used, nothing is said.
+    let skipped = finding(&said, "skipped");
+    assert_eq!(skipped["measured"], "no message of the topics used was left out");
     let output = tagalong().arg("doctor").arg(config()).arg(good()).output().unwrap();
     let printed = text(&output.stdout);
     assert!(printed.contains("nothing to complain about"), "{printed}");
@@ -477,6 +480,10 @@ fn images_that_make_no_frames_are_told() {
     assert_eq!((code, read["severity"].as_str()), (3, Some("bad")), "{said:#}");
     let measured = read["measured"].as_str().unwrap();
     assert!(measured.contains("0 frames of 32 images; colour without depth 32"), "{measured}");
+    assert!(!measured.contains("chunks"), "{measured}");
+    let told = read["remedy"].as_str().unwrap();
+    assert!(told.contains("32 of 32 frames got no image of ") && told.contains(": none of"), "{told}");
+    assert!(!told.contains("pose of the camera"), "what is no loss: {told}");
     assert!(!said["findings"].as_array().unwrap().iter().any(|f| f["id"] == "missed"), "{said:#}");
 }
 
