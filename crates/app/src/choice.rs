@@ -161,6 +161,10 @@ impl Fittings {
         let usable = self.account.usable();
         // "Alone" only if nothing else is there.
         let is_alone = self.account.topics.len() == usable.len();
+        let missing = self.account.curable().filter_map(|topic| topic.could_be);
+        let missing = missing.filter(|input| !usable.contains(input));
+        let mut unusable: Vec<&str> = missing.map(words_of).collect();
+        unusable.dedup();
         let usable: Vec<&str> = usable.into_iter().map(words_of).collect();
         let usable = match usable.split_last() {
             None => "nothing usable".to_owned(),
@@ -168,9 +172,6 @@ impl Fittings {
             Some((last, [])) => (*last).to_owned(),
             Some((last, others)) => format!("{} and {last}", others.join(", ")),
         };
-        let mut unusable: Vec<&str> =
-            self.account.curable().filter_map(|topic| topic.could_be).map(words_of).collect();
-        unusable.dedup();
         if unusable.is_empty() {
             usable
         } else {

@@ -20,7 +20,8 @@ pub struct TopicUse {
     pub calibration: Option<String>,
     /// Reason for which it is not used, or for which its use fails.
     pub problem: Option<String>,
-    /// Input that it could be used as, if the problem were cured and nothing else serves as that.
+    /// Input that it could be used as, if the problem were cured and nothing else serves as that; also
+    /// `laser` for a scanner beside others.
     pub could_be: Option<&'static str>,
     /// Setting or action that cures the problem.
     pub remedy: Option<String>,
@@ -57,7 +58,8 @@ impl InputAccount {
         names
     }
 
-    /// Yields the topics that could serve as an input that is missing, if their problem were cured.
+    /// Yields the topics that could serve as an input that is missing, or as a further scanner, if their
+    /// problem were cured.
     pub fn curable(&self) -> impl Iterator<Item = &TopicUse> {
         self.topics.iter().filter(|topic| topic.could_be.is_some())
     }
