@@ -101,7 +101,7 @@ fn serve(
     let live = Live::start(at, &name, &input, config, registry);
     let live = live.map_err(|error| BridgeError::Serve(at, error))?;
     tell(&format!(
-        "live: open {} in a browser; whoever has this address sees the page",
+        "live: open {} in a browser; anyone with this address sees the page",
         live.address()
     ));
     Ok(live)

@@ -47,37 +47,37 @@ pub const CHOICES: [Choice; 11] = [
     },
     Choice {
         config: "depth-alone",
-        reason: "of those that need no colour it has the best HOTA in leave-one-room-out tests; \
-                 one verifier judges what it finds, so expect some furniture",
+        reason: "of those that need no colour it has the best HOTA in leave-one-room-out tests; it \
+                 has only one verifier, so expect some tracks on furniture",
     },
     Choice {
         config: "depth-net-ekf",
-        reason: "it needs no heads, and no settings for the height of the camera",
+        reason: "it needs neither visible heads nor settings for the height of the camera",
     },
     Choice {
         config: "stereo-verified",
-        reason: "verifiers judge what it finds; with 2 to 3 images a second stereo-svm-ekf has the \
-                 higher HOTA in real rooms",
+        reason: "verifiers check its detections; at 2 to 3 images per second stereo-svm-ekf has \
+                 the higher HOTA in real rooms",
     },
-    Choice { config: "stereo-street", reason: "it is the one for pairs with a wide baseline" },
+    Choice { config: "stereo-street", reason: "it is made for pairs with a wide baseline" },
     Choice {
         config: PANORAMIC,
-        reason: "it is the one for several people before a conical mirror",
+        reason: "it is made for several people in front of a conical mirror",
     },
-    Choice { config: NETWORK, reason: "you installed this network; places in metres are rough" },
+    Choice { config: NETWORK, reason: "you installed this network; positions in metres are rough" },
     Choice {
         config: "lidar",
-        reason: "it sees people all around by the points of the lidar; it was tried on simulated \
-                 ones alone",
+        reason: "it finds people all around in the points of the lidar; it was tried on simulated \
+                 points only",
     },
-    Choice { config: WITHOUT_NETWORK, reason: "it needs no depth; places in metres are rough" },
+    Choice { config: WITHOUT_NETWORK, reason: "it needs no depth; positions in metres are rough" },
     Choice {
         config: "laser-legs",
         reason: "it detects objects that move into free space; people who stand still may be missed",
     },
     Choice {
         config: "laser-follow",
-        reason: "without odometry, motion of the robot and of people cannot be told apart",
+        reason: "without odometry, motion of the robot cannot be told from motion of people",
     },
 ];
 
@@ -360,7 +360,7 @@ fn try_config(
     {
         let [low, high] = settings.suits.baseline_m.unwrap_or_default();
         return Err(Failure::failed(format!(
-            "for pairs with a baseline of {low} to {high} m, and this one has {baseline_m:.2} m"
+            "for pairs with a baseline of {low} to {high} m, but this one has {baseline_m:.2} m"
         ))
         .into());
     }

@@ -80,8 +80,8 @@ fn remedy(installed: &[String], name: &str) -> Option<String> {
     let is_installed = installed.iter().any(|known| known == network);
     if let Some(file) = known_file(network).filter(|_| !is_installed) {
         return Some(format!(
-            "`{name}` runs a network that is known, and not installed: `tagalong model --install \
-             {file}` installs it, and `tagalong model --list` tells where to get the file"
+            "`{name}` runs a known network that is not installed: `tagalong model --install \
+             {file}` installs it, and `tagalong model --list` says where to get the file"
         ));
     }
     if name != NETWORK && !OF_A_FILE.contains(&name) {
@@ -95,8 +95,8 @@ fn remedy(installed: &[String], name: &str) -> Option<String> {
     };
     let with_depth = if name == OF_A_FILE_AND_DEPTH { WITH_DEPTH } else { "" };
     Some(format!(
-        "`{name}` runs the neural network of a file, and is not built in: name one that is installed, as \
-         `{first}{with_depth}`"
+        "`{name}` runs a neural network from a file, and is not built in: name an installed one, \
+         such as `{first}{with_depth}`"
     ))
 }
 

@@ -39,8 +39,8 @@ impl Traits {
         let mut found = Vec::new();
         if suits.odometry && !self.has_odometry {
             found.push(
-                "the config is for a robot with odometry, and there is none: things that the robot \
-                 passes seem to move"
+                "the config is for a robot with odometry, but there is none: objects that the \
+                 robot passes seem to move"
                     .to_owned(),
             );
         }
@@ -48,21 +48,21 @@ impl Traits {
             && suits.baseline_off_m(baseline_m) > 0.0
         {
             found.push(format!(
-                "the pair has a baseline of {baseline_m:.2} m, and the config is for {low} to {high} m"
+                "the pair has a baseline of {baseline_m:.2} m, but the config is for {low} to {high} m"
             ));
         }
         if let (Some(height_m), Some([low, high])) = (self.camera_height_m, suits.camera_height_m)
             && suits.height_off_m(height_m) > Suits::HEIGHT_TOLERANCE_M
         {
             found.push(format!(
-                "the camera is {height_m:.2} m high, and the config is for {low} to {high} m"
+                "the camera is {height_m:.2} m high, but the config is for {low} to {high} m"
             ));
         }
         if let (Some(pitch_deg), Some([low, high])) = (self.pitch_down_deg, suits.pitch_down_deg)
             && suits.pitch_off_deg(pitch_deg) > PITCH_TOLERANCE_DEG
         {
             found.push(format!(
-                "the camera looks down by {pitch_deg:.0} degrees, and the config is for {low} to {high}"
+                "the camera looks down by {pitch_deg:.0} degrees, but the config is for {low} to {high}"
             ));
         }
         found
@@ -85,7 +85,7 @@ pub fn misfit_note(config: &str, unsuited: &[(String, Vec<String>)]) -> Option<S
         return None;
     }
     Some(format!(
-        "{config} is by its [suits] not made for {}: expect worse tracks",
+        "{config} is not made for {} according to its [suits]: expect worse tracks",
         each.join(", ")
     ))
 }
@@ -107,7 +107,8 @@ pub fn misfits_note(configs: &[(String, LogMisfits)]) -> Option<String> {
         return misfit_note(config, logs);
     }
     Some(format!(
-        "{} configs are by their [suits] not made for some of the logs, where tracks are worse: {}",
+        "{} configs are not made for some of the logs according to their [suits], and track worse \
+         there: {}",
         each.len(),
         each.join(", ")
     ))
@@ -134,7 +135,7 @@ mod tests {
         };
         let found = SEEN.misfits(&suits);
         let parts =
-            ["there is none", "0.50 m, and the config is for 0 to 0.3 m", "0.50 m high", "20"];
+            ["there is none", "0.50 m, but the config is for 0 to 0.3 m", "0.50 m high", "20"];
         assert_eq!(found.len(), parts.len(), "{found:?}");
         for (misfit, part) in found.iter().zip(parts) {
             assert!(misfit.contains(part), "{misfit}");
@@ -156,7 +157,7 @@ mod tests {
             misfit_note("low", &[log("a", &["too high"]), log("b", &[]), log("c", &["x", "y"])]);
         let note = note.unwrap();
         assert!(
-            note.starts_with("low is by its [suits] not made for a (too high), c (x; y)"),
+            note.starts_with("low is not made for a (too high), c (x; y) according to its [suits]"),
             "{note}"
         );
         assert_eq!(misfit_note("low", &[log("b", &[])]), None);
@@ -176,7 +177,7 @@ mod tests {
         let two = config("wide", [&["too high"], &["x", "y"]]);
         let fits = config("all", [&[], &[]]);
         let note = misfits_note(&[one.clone(), fits.clone(), two]).expect("a note");
-        assert!(note.starts_with("2 configs are by their [suits] not made for some"), "{note}");
+        assert!(note.starts_with("2 configs are not made for some"), "{note}");
         assert!(note.ends_with(": low (1 log), wide (2 logs)"), "{note}");
         assert_eq!(misfits_note(&[one.clone(), fits.clone()]), misfit_note("low", &one.1));
         assert_eq!(misfits_note(&[fits]), None);

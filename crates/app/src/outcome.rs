@@ -155,7 +155,7 @@ pub fn spare(file: &Path, overwrite: bool) -> Result<(), Failure> {
 }
 
 /// Message after a signal ended the writing of a log.
-pub const CUT_SHORT: &str = "stopped; the log is whole, but ends early";
+pub const CUT_SHORT: &str = "stopped; the log is valid, but ends early";
 
 /// Returns a text without characters that steer a terminal: names in a log come from anywhere.
 fn harmless(text: &str) -> Cow<'_, str> {

@@ -46,8 +46,8 @@ impl RecordedBoxes {
     pub fn note_on_logs(&self, config: &str, logs: usize) -> Option<String> {
         (logs > 1).then(|| {
             format!(
-                "{config} takes the boxes of {} for all {logs} logs, and they are those of one: give each log \
-                 a config of its own, or score tracks with --tracks NAME=DIR",
+                "{config} takes the boxes of {} for all {logs} logs, but they belong to one: give \
+                 each log a config of its own, or score tracks with --tracks NAME=DIR",
                 self.name
             )
         })

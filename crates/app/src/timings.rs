@@ -74,8 +74,8 @@ pub fn too_slow(frame_ms: f64, period_ms: f64) -> Option<String> {
     let is_slow = period_ms > 0.0 && frame_ms > period_ms && frame_ms.is_finite();
     is_slow.then(|| {
         format!(
-            "on this computer {} of {} frames a second ({frame_ms:.0} ms of wall time each, one is there every \
-             {period_ms:.0} ms): live, the others are skipped",
+            "on this computer {} of {} frames per second ({frame_ms:.0} ms of wall time each, one \
+             arrives every {period_ms:.0} ms): live, the others are skipped",
             per_second(frame_ms),
             per_second(period_ms)
         )
@@ -168,7 +168,7 @@ mod tests {
     fn a_pipeline_that_is_slower_than_the_log_is_told_with_both_rates() {
         let told = too_slow(512.0, 40.0).expect("a slow one");
         assert!(
-            told.starts_with("on this computer 2.0 of 25 frames a second (512 ms of"),
+            told.starts_with("on this computer 2.0 of 25 frames per second (512 ms of"),
             "{told}"
         );
         for (frame_ms, period_ms) in [(40.0, 40.0), (10.0, 40.0), (10.0, 0.0), (f64::NAN, 40.0)] {

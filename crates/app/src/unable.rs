@@ -29,8 +29,8 @@ pub fn unable<'a>(
         }
         if test == NO_PANORAMA {
             return Some(format!(
-                "{config}: a detector is for panoramas of a conical mirror, which the camera of the \
-                 log does not make, so {result}: take another config, as `tagalong run LOG` does, or \
+                "{config}: a detector needs panoramas of a conical mirror, but the camera of the \
+                 log makes none, so {result}: take another config, as `tagalong run LOG` does, or \
                  record a `camera_info` that says `conical_mirror`"
             ));
         }

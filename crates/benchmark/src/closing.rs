@@ -121,8 +121,8 @@ pub fn notes(plan: &[Task], all: &[Stored]) -> Vec<String> {
         .into_iter()
         .map(|(log, seconds)| {
             format!(
-                "{log}: frames are {seconds:.1} s apart: figures of IDs (HOTA, IDF1, switches) mean \
-                 little; `--rooms FILE` can say that they are single frames"
+                "{log}: frames are {seconds:.1} s apart: figures of IDs (HOTA, IDF1, switches) \
+                 mean little; `--rooms FILE` can mark such logs as single frames"
             )
         })
         .collect();

@@ -25,7 +25,7 @@ const ENDINGS: [&str; 2] = ["txt", "csv"];
 pub const TRACKS: &str = "tracks";
 /// Cause of all misses of another program, and the sentence about it.
 const CAUSE: &str = "tracks of another program";
-const WHY: &str = "of tracks of another program no dropped candidates are known";
+const WHY: &str = "the dropped candidates of another program are not known";
 
 impl ForeignTracks {
     /// Returns the task of scoring the tracks on a log.

@@ -155,7 +155,7 @@ fn stopped(done: usize, asked: &str, store: &Store) -> String {
     let folder = store.path("");
     format!(
         "stopped: {done} of {asked} have their results in {}, and there is no new report; the same \
-         command goes on with the others",
+         command continues with the others",
         folder.display()
     )
 }
@@ -180,7 +180,7 @@ mod tests {
     fn an_interrupted_benchmark_says_where_its_results_are_and_how_it_goes_on() {
         let told = stopped(3, "12 tasks", &Store::new(std::path::Path::new("out")));
         assert!(told.contains("3 of 12 tasks have their results in out"), "{told}");
-        assert!(told.contains("the same command goes on"), "{told}");
+        assert!(told.contains("the same command continues"), "{told}");
     }
 
     #[test]

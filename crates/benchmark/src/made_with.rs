@@ -97,8 +97,8 @@ pub fn notes<'a>(done: impl Iterator<Item = &'a Task>) -> Vec<String> {
 fn note(logs: &BTreeSet<&str>, pipelines: &[&str]) -> String {
     let logs: Vec<&str> = logs.iter().copied().collect();
     format!(
-        "models or settings of {} were made with {}: figures there say little about another room, \
-         those of rooms left out are in docs/benchmarks.md",
+        "models or settings of {} were fitted to {}: figures there say little about other rooms; \
+         docs/benchmarks.md has those of rooms left out",
         pipelines.join(", "),
         logs.join(", ")
     )
@@ -251,8 +251,8 @@ mod tests {
         }
         let notes = notes(tasks.iter());
         let starts = [
-            "models or settings of c were made with lab, um:",
-            "models or settings of a, b were made with um:",
+            "models or settings of c were fitted to lab, um:",
+            "models or settings of a, b were fitted to um:",
         ];
         assert_eq!(notes.len(), 2, "{notes:?}");
         for (note, start) in notes.iter().zip(starts) {

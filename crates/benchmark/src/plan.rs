@@ -475,7 +475,7 @@ fn mcap_files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     if folder.is_file() {
         let file = folder.display();
         return Err(Failure::usage(format!(
-            "--logs-dir is a folder of logs, and {file} is a file: `--logs {file}`"
+            "--logs-dir takes a folder of logs, but {file} is a file: `--logs {file}`"
         )));
     }
     suggest::mcap_files(folder)
@@ -504,7 +504,7 @@ fn makes_truth(log: &Path) -> String {
     let opened = FrameSource::open(log, &settings, &Limits::default(), Inputs::ANY);
     let is_blind = opened.is_ok_and(|source| source.facts().width == 0);
     if is_blind {
-        return "without images people cannot be annotated: give their places as \
+        return "without images people cannot be annotated: give their positions as \
                 NAME.people-floor.csv beside it"
             .into();
     }

@@ -86,7 +86,7 @@ pub fn work(args: &RunArgs, store: &Store, registry: &Registry) -> Result<Tally,
 
 fn jobs(args: &RunArgs) -> usize {
     if args.timing && args.jobs > 1 {
-        say("note: --timing runs one task at a time; --jobs is passed over");
+        say("note: --timing runs one task at a time; --jobs is ignored");
     }
     if args.timing { 1 } else { usize::from(args.jobs) }
 }
@@ -99,7 +99,7 @@ fn asked(args: &RunArgs, store: &Store) -> Result<Vec<Task>, Failure> {
     if let Some(task) = tasks.iter().find(|task| task.version != program) {
         let planned = &task.version;
         return Err(Failure::usage(format!(
-            "the plan is of program {planned}, and this is {program}; plan again"
+            "the plan was made by program {planned}, but this is {program}; plan again"
         )));
     }
     if let Some(wanted) = &args.task {

@@ -58,7 +58,7 @@ pub(crate) fn unpack_message(
         Ok(length) if length as u64 > longest => Err(too_long(longest + 1, longest)),
         Ok(_) => Ok(()),
         Err(error) => {
-            let why = format!("a compressed message does not unpack: {error}");
+            let why = format!("a compressed message cannot be unpacked: {error}");
             Err(("damaged_records", why))
         }
     }
@@ -138,7 +138,9 @@ fn unpack_file(packed: File, limits: &Limits) -> Result<LogFile, String> {
         let count = match decoder.read(&mut step) {
             Ok(0) => break None,
             Ok(count) => count,
-            Err(error) => break Some(format!("it does not unpack behind byte {written}: {error}")),
+            Err(error) => {
+                break Some(format!("it cannot be unpacked after byte {written}: {error}"));
+            }
         };
         written += count as u64;
         if written > limits.file_bytes {

@@ -242,7 +242,7 @@ impl Scan {
         }
         self.data_lost = true;
         self.counters.insert("missing_files", missing.len() as u64);
-        self.notes.push(format!("not there, and listed in metadata.yaml: {}", missing.join(", ")));
+        self.notes.push(format!("listed in metadata.yaml, but missing: {}", missing.join(", ")));
         self
     }
 
@@ -628,8 +628,8 @@ impl Topic {
             self.cloud_fault = None;
         } else {
             self.cloud_fault = Some(format!(
-                "its points have x ahead (frame `{frame}`), and those of an optical frame, with z \
-                 ahead, are read: record the depth images of that camera"
+                "its points have x ahead (frame `{frame}`), but only those of an optical frame, \
+                 with z ahead, can be read: record the depth images of that camera"
             ));
         }
         is_usable

@@ -129,34 +129,30 @@ const RATE: Figure = Figure {
 const FIGURES: &[Figure] = &[
     Figure {
         name: "HOTA",
-        meaning: "Finding people and keeping them apart, in balance. 1 is perfect.",
+        meaning: "Detection and association together. 1 is perfect.",
         compared: true,
         of: |s| s.hota,
         ..RATE
     },
-    Figure {
-        name: "DetA",
-        meaning: "The part of HOTA for finding people.",
-        of: |s| s.det_a,
-        ..RATE
-    },
+    Figure { name: "DetA", meaning: "The detection part of HOTA.", of: |s| s.det_a, ..RATE },
     Figure {
         name: "AssA",
-        meaning: "The part of HOTA for keeping each person under one number.",
+        meaning: "The association part of HOTA: how well each person keeps one ID.",
         of: |s| s.ass_a,
         ..RATE
     },
     Figure {
         name: "MOTA",
         range: [f64::NEG_INFINITY, 1.0],
-        meaning: "1 less all misses, false reports and switches per person in view; may be negative.",
+        meaning: "1 minus misses, false positives and ID switches per annotated person and frame; \
+                  may be negative.",
         compared: true,
         of: |s| s.mota,
         ..RATE
     },
     Figure {
         name: "IDF1",
-        meaning: "How much of the time each person carries the same one number.",
+        meaning: "Share of the time in which each person has one and the same ID.",
         compared: true,
         of: |s| s.idf1,
         ..RATE
@@ -164,7 +160,7 @@ const FIGURES: &[Figure] = &[
     Figure {
         name: "LAMR",
         higher_is_better: false,
-        meaning: "People missed, averaged from one false report in 100 images to one in each.",
+        meaning: "Log-average miss rate, from one false positive in 100 images to one per image.",
         places: &[ComparisonSpace::Image],
         compared: true,
         of: lamr_of_enough_scores,
@@ -193,7 +189,7 @@ const FIGURES: &[Figure] = &[
         range: POSITIVE,
         decimals: 2,
         higher_is_better: false,
-        meaning: "Reports where nobody is, per frame. Counts on empty logs too.",
+        meaning: "False positives per frame. Counts on empty logs, too.",
         compared: true,
         of: |s| s.fp_per_frame,
         ..RATE
@@ -204,7 +200,7 @@ const FIGURES: &[Figure] = &[
         unit: "s",
         decimals: 2,
         higher_is_better: false,
-        meaning: "Time from coming into view to the first match; people never found do not enter.",
+        meaning: "Time from coming into view to the first match, without people who are never found.",
         places: &[ComparisonSpace::Image],
         of: |s| s.time_to_confirm_mean_s,
         ..RATE
@@ -215,7 +211,7 @@ const FIGURES: &[Figure] = &[
         unit: "s",
         decimals: 2,
         higher_is_better: false,
-        meaning: "Time that tracks spend on another person than they began with, per log.",
+        meaning: "Time in which tracks are on another person than the one they began with, per log.",
         of: |s| Some(s.wrong_person_s),
         ..RATE
     },
@@ -234,7 +230,7 @@ const FIGURES: &[Figure] = &[
         name: "OSPA",
         range: POSITIVE,
         higher_is_better: false,
-        meaning: "One distance for wrong places and wrong numbers of people.",
+        meaning: "One distance for wrong positions and a wrong number of people.",
         of: |s| s.ospa,
         ..RATE
     },

@@ -28,8 +28,8 @@ pub struct Benchmark {
 /// Says that logs go back to one recording, so that intervals over logs are too narrow.
 pub fn copies_note(logs: &[String]) -> String {
     format!(
-        "{} go back to one recording, as copies of `tagalong alter` do, but count as {} independent logs: \
-         the intervals are too narrow and the p-values too small",
+        "{} come from one recording, such as copies of `tagalong alter`, but count as {} \
+         independent logs: the intervals are too narrow and the p-values too small",
         logs.join(" and "),
         logs.len()
     )

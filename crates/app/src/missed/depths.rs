@@ -149,7 +149,8 @@ fn limit(rules: Rules<'_>, key: &str, wider: fn(f64, f64) -> f64) -> Option<Limi
 
 fn outside(words: &str, than: &str, limit: &Limit) -> String {
     format!(
-        "no detector proposed a candidate here: {words}, {than} than the detectors look; decided by {}",
+        "no detector proposed a candidate here: {words}, {than} than the detectors search; \
+         decided by {}",
         limit.line
     )
 }

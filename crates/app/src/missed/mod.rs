@@ -29,7 +29,7 @@ const NOT_BEST: &str = "not the best detection";
 const NOT_CONFIRMED: &str = "track: not confirmed";
 
 /// End of the sentence about a track that is seen at a person whom the comparison misses.
-const BESIDE: &str = "is seen here, but too far beside the annotated person to count as found";
+const BESIDE: &str = "is seen here, but too far from the annotated person to count as found";
 
 /// Time after which the track that was on a person is not told any more, ns.
 const RECENT_NS: i64 = 2_000_000_000;

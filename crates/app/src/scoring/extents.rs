@@ -29,10 +29,11 @@ pub fn as_upper_bodies(sequence: &Sequence) -> Option<(Sequence, String)> {
         });
     }
     let note = format!(
-        "nothing matches, and the boxes of the tracks are {report:.1} times as high as wide, those of \
-         the truth {truth:.1} times: compared are the upper bodies of the tracks, taken for people of \
-         {STANDING_HEIGHT_M} m who stand; tracks of upper bodies need no guess (`[output] boxes = \"upper\"`, \
-         and `body` of a detector other than \"full-box\")"
+        "nothing matches, and the boxes of the tracks are {report:.1} times as high as wide, those \
+         of the truth {truth:.1} times: the upper bodies of the tracks are compared, on the \
+         assumption of standing people of {STANDING_HEIGHT_M} m; tracks of upper bodies need no \
+         assumption (`[output] boxes = \"upper\"`, and `body` of a detector other than \
+         \"full-box\")"
     );
     Some((cut, note))
 }
@@ -45,9 +46,9 @@ pub fn whole_bodies_in_truth(sequence: &Sequence) -> Option<String> {
         return None;
     }
     Some(format!(
-        "nothing matches, and the boxes of the truth are {truth:.1} times as high as wide, those of the \
-         tracks {report:.1} times: compared are the upper bodies of the truth, as with --upper-body; \
-         `[output] boxes = \"full\"` makes tracks of whole people"
+        "nothing matches, and the boxes of the truth are {truth:.1} times as high as wide, those \
+         of the tracks {report:.1} times: the upper bodies of the truth are compared, as with \
+         --upper-body; `[output] boxes = \"full\"` makes tracks of whole people"
     ))
 }
 

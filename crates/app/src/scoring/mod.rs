@@ -117,7 +117,7 @@ fn without_area<'a>(
         |OddLines { count, first, of }| {
             format!(
                 "{name}: {count} of {of} boxes have no area (the first in line {first}); as in \
-                 TrackEval they match nobody"
+                 TrackEval they match no person"
             )
         },
     )
@@ -145,8 +145,8 @@ pub fn read_text(path: &Path) -> Result<String, Failure> {
     read_bounded(path, FileLimit::Table).map_err(|error| {
         Failure::failed(match error.kind() {
             ErrorKind::InvalidData => format!(
-                "{shown} is no text; truth and tracks are MOTChallenge, KITTI or CSV text, a log, or \
-                 the folder of a run"
+                "{shown} is not text; truth and tracks are MOTChallenge, KITTI or CSV text, a log, \
+                 or the folder of a run"
             ),
             ErrorKind::NotFound => format!("{shown}: no such file{}", file_hint(path)),
             _ => format!("cannot read {shown}: {error}"),

@@ -66,7 +66,7 @@ impl Tracks {
         let first = text.lines().next().unwrap_or_default();
         if ["ub_x", "head_x"].iter().any(|column| first.contains(column)) {
             return Err(Failure::usage(format!(
-                "{name} is a truth, and no tracks: name it as --truth"
+                "{name} is a truth, not tracks: name it as --truth"
             )));
         }
         // Of all formats, only `tracks-metres.csv` begins with this column.
@@ -125,7 +125,8 @@ impl Tracks {
             .map_err(|error| Failure::failed(format!("{}: {error}", path.display())))?;
         if facts.ended != complete() {
             self.notes.push(format!(
-                "{}: the run is not whole ({}); the frames after its end count as frames without tracks",
+                "{}: the run is incomplete ({}); the frames after its end count as frames without \
+                 tracks",
                 folder.display(),
                 facts.ended
             ));

@@ -122,7 +122,8 @@ impl TruthFile {
         if is_run(path) || is_of_run(path) {
             let shown = path.display();
             return Err(Failure::usage(format!(
-                "{shown} is that which a run found, and no truth: perhaps --truth and --tracks are swapped"
+                "{shown} was written by a run, and is not a truth: perhaps --truth and --tracks \
+                 are swapped"
             )));
         }
         let mut truth = match kind_of(path)? {
@@ -148,7 +149,7 @@ impl TruthFile {
         }
         if dropped > 0 {
             self.notes.push(format!(
-                "{name}: {dropped} people are left out, whose ID the frame has already"
+                "{name}: {dropped} people are left out, because the frame has their ID already"
             ));
         }
     }
@@ -410,8 +411,8 @@ fn proposed_note(name: &str, rows: &[people::Row]) -> Option<String> {
     let proposers: Vec<&str> = proposers.into_iter().collect();
     (!proposers.is_empty()).then(|| {
         format!(
-            "{name}: {} of {} boxes, in {} frames, were proposed by {} and not reviewed: figures of it, and \
-             of pipelines like it, are too good there",
+            "{name}: {} of {} boxes, in {} frames, were proposed by {} and not reviewed: its \
+             figures there, and those of similar pipelines, are too good",
             proposed.count(),
             rows.len(),
             frames.len(),
@@ -488,16 +489,17 @@ fn shown(path: &Path) -> String {
 fn foreign(first: &str) -> Option<&'static str> {
     match first.trim_start().chars().next()? {
         '{' | '[' => Some(
-            "FILE is JSON, and no truth of a log: of COCO `tagalong import images FOLDER --boxes FILE` \
-             makes a log with truth",
+            "FILE is JSON, not a truth of a log: of COCO `tagalong import images FOLDER --boxes \
+             FILE` makes a log with truth",
         ),
         '<' => Some(
-            "FILE is XML, and no truth of a log: of CVAT `tagalong import cvat FILE -o LOG.people.csv` makes \
-             one",
+            "FILE is XML, not a truth of a log: of CVAT `tagalong import cvat FILE -o \
+             LOG.people.csv` makes one",
         ),
         letter if letter.is_alphabetic() && first.contains([',', ';', '\t']) => Some(
-            "FILE has columns of another format, and is no truth of a log: with image and box `tagalong \
-             import images FOLDER --boxes FILE` makes a log with truth; see docs/logs.md for people.csv",
+            "FILE has columns of another format, and is not a truth of a log: with image and box \
+             `tagalong import images FOLDER --boxes FILE` makes a log with truth; see docs/logs.md \
+             for people.csv",
         ),
         _ => None,
     }
@@ -604,7 +606,10 @@ mod tests {
         let frames = file.frames(&Shots::default());
         assert_eq!(frames[&1].0, [person_at(5, 1.0), person_at(6, 3.0)]);
         assert_eq!(frames[&2].0.len(), 1);
-        assert_eq!(file.notes, ["gt.txt: 1 people are left out, whose ID the frame has already"]);
+        assert_eq!(
+            file.notes,
+            ["gt.txt: 1 people are left out, because the frame has their ID already"]
+        );
     }
 
     /// A person with a small box at this column.

@@ -337,7 +337,7 @@ fn drop_doubled_ids(sequences: &mut [GivenSequence]) {
         if dropped > 0 {
             let name = &sequence.info.name;
             say(&format!(
-                "note: {name}: {dropped} people are left out, whose ID the frame has already"
+                "note: {name}: {dropped} people are left out, because the frame has their ID already"
             ));
         }
     }

@@ -469,7 +469,7 @@ impl Fitted {
             }
         }];
         notes.extend(self.spread(seed));
-        notes.extend(self.too_few.as_ref().map(|why| format!("Nothing to say: it {why}.")));
+        notes.extend(self.too_few.as_ref().map(|why| format!("No figures: it {why}.")));
         let mut chosen: BTreeMap<String, Vec<&str>> = BTreeMap::new();
         for InRoom { room, chosen_without, .. } in &self.rooms {
             chosen.entry(self.changes(chosen_without)).or_default().push(room);

@@ -302,5 +302,5 @@ fn figures(
     let blank = TaskResult { log: log.name.clone(), ..TaskResult::default() };
     let (result, _) = lane.watch.score(truth, shots, blank, None)?;
     let scores = result.image.or(result.metres).ok_or("its truth cannot be compared")?;
-    Figures::of(&scores).ok_or_else(|| "its truth has nobody to find".to_owned())
+    Figures::of(&scores).ok_or_else(|| "its truth has no people".to_owned())
 }

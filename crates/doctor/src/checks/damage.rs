@@ -37,7 +37,7 @@ fn lost(counters: &BTreeMap<&'static str, u64>, sentences: &[String]) -> Finding
     parts.extend(sentences.iter().take(SENTENCES).cloned());
     let finding =
         Finding::new("file", Severity::Warn, format!("data was lost: {}", parts.join("; ")))
-            .why("what is lost is not looked at, and people in it are missed");
+            .why("lost parts are skipped, and people in them are missed");
     // The sentences about other losses end in their remedies.
     if counters.keys().any(|name| LOSSES.contains(name)) {
         return finding.remedy("copy the log again, if it is whole where it was recorded");

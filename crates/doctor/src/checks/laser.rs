@@ -72,7 +72,7 @@ fn judge(topic: &str, rate_hz: Option<f64>, frames: u64, scans: &Scans) -> Findi
         .figure("height_m", scans.height_m)
         .why("legs are looked for in the scans, 0.05 to 0.9 m above the floor");
     finding.remedy(if few_rays > Severity::Ok {
-        "few rays come back: is the window clean, the range set right, the driver's filter too strict?"
+        "few rays have a return: clean the window; check the range that is set and the driver's filter"
     } else if is_high {
         "mount the scanner at the height of legs, or correct its transform"
     } else {
@@ -131,7 +131,7 @@ mod tests {
         let blind = Scans { readings: 0, farthest_m: 0.0, ..good };
         let told = judge("/rear", Some(10.0), 40, &blind);
         assert_eq!(told.severity, Severity::Bad, "{told:?}");
-        assert!(told.remedy.unwrap().contains("few rays come back"));
+        assert!(told.remedy.unwrap().contains("few rays have a return"));
         let ending = Scans { count: 20, readings: 20 * 180, ..good };
         let told = judge("/rear", Some(10.0), 40, &ending);
         assert_eq!(told.severity, Severity::Bad, "{told:?}");

@@ -32,7 +32,7 @@ pub fn reading(evidence: &Evidence) -> Option<Finding> {
     let finding = Finding::new("frames-read", severity, measured)
         .figure("frames", made as f64)
         .figure("wanted", wanted as f64)
-        .why("an image that makes no frame is not looked at by any pipeline");
+        .why("no pipeline processes an image that makes no frame");
     let sentences = [&evidence.losses[..], &evidence.frameless[..]].concat();
     Some(if sentences.is_empty() { finding } else { finding.remedy(sentences.join("\n")) })
 }

@@ -105,14 +105,14 @@ impl Bag {
                 walk.count("chunks_without_crc");
                 walk.rest = 0..walk.buffer.len();
             }
-            Ok(()) => walk.fault("damaged_chunks", || "a chunk has not the size it claims".into()),
+            Ok(()) => walk.fault("damaged_chunks", || "a chunk is not of the claimed size".into()),
             Err(Unpack::Unknown) => {
                 walk.fault("unknown_compression_chunks", || {
                     format!("compression `{compression}`; known: none, bz2, lz4")
                 });
             }
             Err(Unpack::Damaged(why)) => {
-                walk.fault("damaged_chunks", || format!("a chunk does not unpack: {why}"));
+                walk.fault("damaged_chunks", || format!("a chunk cannot be unpacked: {why}"));
             }
         }
     }

@@ -114,7 +114,7 @@ pub fn camera_of_cloud(
         }
     }
     Err(ImageError::Cloud(
-        "its points are not those of the pixels of a camera, as those of a lidar".into(),
+        "its points do not belong to the pixels of a camera, like those of a lidar".into(),
     ))
 }
 

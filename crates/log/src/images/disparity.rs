@@ -90,7 +90,7 @@ pub fn decode_compressed_disparity(
     limits: &Limits,
 ) -> Result<DepthFromDisparity, ImageError> {
     if image.data.starts_with(&[0xff, 0xd8]) {
-        return Err(ImageError::Codec("disparities in a JPEG, which changes them".into()));
+        return Err(ImageError::Codec("disparities as JPEG, which changes their values".into()));
     }
     let pixels = decode_compressed(image, Some(1.0), limits)?;
     let unit_px = match pixels {

@@ -96,8 +96,8 @@ pub enum ImageError {
     NoDisparity(String),
     /// Disparities in a unit for which there is no convention.
     #[error(
-        "disparities as `{0}`, for which there is no one unit: set `disparity.unit_px` under \
-         [input] (0.0625 for 16 parts of a pixel, 0.00390625 for 256)"
+        "disparities as `{0}`, which has no fixed unit: set `disparity.unit_px` under [input] \
+         (0.0625 for 16 parts of a pixel, 0.00390625 for 256)"
     )]
     Unit(String),
     /// Disparities without a geometry that makes depth of them.

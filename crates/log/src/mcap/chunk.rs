@@ -63,7 +63,7 @@ fn read_parts<R: Read>(
     }
     decompress(source, &head, out)?;
     if out.len() as u64 != head.uncompressed_size {
-        let why = format!("a chunk claims {} bytes and has others", head.uncompressed_size);
+        let why = format!("a chunk claims {} bytes, but has another size", head.uncompressed_size);
         return Err(skipped("damaged_chunks", why));
     }
     let has_crc = head.uncompressed_crc != 0;
@@ -120,7 +120,8 @@ fn decompress<R: Read>(
             return Err(skipped("unknown_compression_chunks", why));
         }
     };
-    outcome.map_err(|error| skipped("damaged_chunks", format!("a chunk does not unpack: {error}")))
+    outcome
+        .map_err(|error| skipped("damaged_chunks", format!("a chunk cannot be unpacked: {error}")))
 }
 
 /// Reads at most one byte more than promised, which is enough to detect a wrong size.

@@ -234,7 +234,7 @@ fn take_data_end<R: Read>(walk: &mut Walk<R>, length: u64, crc: u32) {
     let stored = walk.buffer.get(..4).map_or(0, |b| record::u32_at(b, 0));
     if stored != 0 && stored != crc {
         walk.fault("data_section_crc_failed", || {
-            "the checksum of the whole file is wrong: something in it was changed".into()
+            "the checksum of the whole file is wrong: its content was changed".into()
         });
     }
 }

@@ -240,7 +240,7 @@ fn depth_of(
     match pixels? {
         Pixels::Depth(depth) => Ok(depth),
         Pixels::Colour(_) | Pixels::Grey(_) => {
-            Err(ImageError::Codec("the pixels are a picture and no depth".to_owned()))
+            Err(ImageError::Codec("the pixels are a picture, not depth".to_owned()))
         }
     }
 }

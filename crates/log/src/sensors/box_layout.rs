@@ -76,8 +76,9 @@ impl BoxLayout {
             && (least < 0.0 || most > 1.0)
         {
             tally.note(format!(
-                "{topic}: scores from {least:.2} to {most:.2} are no probabilities: let the detector \
-                 write 0 to 1; margins are taken with `score = \"log-odds\"` of recorded-detections"
+                "{topic}: scores from {least:.2} to {most:.2} are no probabilities: let the \
+                 detector write 0 to 1; log-odds need `score = \"log-odds\"` of \
+                 recorded-detections"
             ));
         }
     }

@@ -141,7 +141,7 @@ impl SensorReader for Recorded {
             let read = self.read;
             tally.lose("detections_lost", || {
                 format!(
-                    "{topic}: none of the {read} messages belongs to a frame, so that nobody is seen"
+                    "{topic}: none of the {read} messages belongs to a frame, so no person is detected"
                 )
             });
         }
@@ -225,7 +225,7 @@ impl Recorded {
             Err(why) => {
                 let topic = moment.topic;
                 tally.lose("messages_undecodable", || {
-                    format!("{topic}: a message of detections is not as its type says: {why}")
+                    format!("{topic}: a message of detections does not match its type: {why}")
                 });
                 return None;
             }

@@ -254,8 +254,9 @@ impl Assembler {
             if known.is_some() && !self.is_hold_told {
                 self.is_hold_told = true;
                 tally.note(format!(
-                    "{} has no pose of the camera at some frames, which get the last known one: if the \
-                     camera does not move on the robot, publish it on /tf_static, else throughout",
+                    "{} has no pose of the camera at some frames, which get the last known one: \
+                     publish it on /tf_static if the camera does not move on the robot, otherwise \
+                     throughout the log",
                     plan.mount.source()
                 ));
             }

@@ -107,8 +107,9 @@ impl Assembly {
                 {
                     let name = input.name();
                     self.tally.tell_frameless(format!(
-                        "{without} of {frames} images make no frame, because no image of {topic} belongs to \
-                         them: {words}; record it at their rate, or take a pipeline without {name}"
+                        "{without} of {frames} images make no frame, because no image of {topic} \
+                         belongs to them: {words}; record that topic at their rate, or take a \
+                         pipeline without {name}"
                     ));
                 }
                 continue;

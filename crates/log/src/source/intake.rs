@@ -151,7 +151,7 @@ impl Intake {
             Ok(Picture::Parameters) => {}
             Ok(Picture::OutOfOrder) => tally.lose("video_out_of_order", || {
                 format!(
-                    "{topic} at {}: the picture belongs before one with an earlier stamp, so that its \
+                    "{topic} at {}: the picture belongs before one with an earlier stamp, so its \
                      time is not known; record video without B-frames",
                     packet.header.stamp()
                 )
@@ -206,7 +206,7 @@ impl Intake {
                 };
                 tally.lose("frames_of_same_stamp", || {
                     format!(
-                        "{topic}: different images have the same stamp, and only the first of them \
+                        "{topic}: different images have the same stamp, and only the first one \
                          makes a frame: {remedy}"
                     )
                 });

@@ -168,7 +168,7 @@ impl FrameSource {
         if self.walker.data_lost() && !plan.scan.data_lost {
             let notes = self.walker.notes();
             tally.lose("log_changed_while_read", || {
-                format!("the file was whole when it was opened and is not any more: {notes}")
+                format!("the file was undamaged when it was opened, but is damaged now: {notes}")
             });
         }
     }

@@ -281,18 +281,18 @@ fn timed(
         let stamp = topic.stamps.first().copied().unwrap_or_default();
         tally.count("logs_without_stamps");
         tally.note(format!(
-            "the stamps of {primary} are not set: all are {stamp}; the times of recording are \
-             taken in place of all stamps (`stamps = \"recording\"` under [input])"
+            "the stamps of {primary} are not set: all are {stamp}; the times of recording are used \
+             instead of all stamps (`stamps = \"recording\"` under [input])"
         ));
     } else {
-        tally.note("the times of recording are taken in place of all stamps");
+        tally.note("the times of recording are used instead of all stamps");
     }
     Ok((Arc::new(scan.with_recording_times()), true))
 }
 
 /// Tells that there is no odometry, and which frame of tf the robot moves in all the same.
 fn no_odometry(plan: &Plan) -> String {
-    let at_rest = "no odometry: the robot is taken to be at rest".to_owned();
+    let at_rest = "no odometry: the robot is assumed to be at rest".to_owned();
     let tf = &plan.scan.tf;
     let robot = robot_frame(&plan.scan, &plan.input);
     let root = tf.root_of(robot);
@@ -329,8 +329,8 @@ fn depth_unit_m(
         let kind = kind_of(topic);
         let unit = match told {
             Some((from, unit_m)) => format!("{unit_m} m by {from}"),
-            None => "a millimetre unless the floor tells another, because no message does: \
-                     `depth_unit_m` under [input] sets it"
+            None => "a millimetre unless the floor shows another one, because no message states \
+                     it: `depth_unit_m` under [input] sets it"
                 .to_owned(),
         };
         tally.note(format!("{name} ({kind}) is taken for depth, in units of {unit}"));
@@ -355,8 +355,8 @@ fn note_choices(plan: &Plan, tally: &mut Tally) {
     if let (Some(other), Some(used)) = (other, &plan.chosen.camera) {
         let camera = other.camera.as_deref().unwrap_or_default();
         tally.note(format!(
-            "the images of the camera {used} are used, those of {camera} are not: \
-             `camera = \"{camera}\"` under [input] takes them"
+            "the images of the camera {used} are used, those of {camera} are not: `camera = \
+             \"{camera}\"` under [input] takes them"
         ));
     }
     let odometry = plan.chosen.odometry.as_deref();
@@ -500,7 +500,7 @@ fn check_calibration(plan: &Plan, tally: &mut Tally) -> Result<(), LogError> {
         return Err(missing(&plan.scan, wanted, hint.to_owned()));
     }
     if plan.lens.is_none() && !plan.is_of_scans() {
-        tally.note("no calibration: a lens with a view of 53 degrees is assumed");
+        tally.note("no calibration: a lens with a field of view of 53 degrees is assumed");
     }
     Ok(())
 }
@@ -611,14 +611,15 @@ fn take_measured_unit(plan: &mut Plan, unit_m: f64, tally: &mut Tally) {
     if is_open {
         plan.depth_unit_m = Some(unit_m);
         tally.note(format!(
-            "the unit of {name} is taken to be {unit_m} m, by the floor and the height of the camera"
+            "the unit of {name} is assumed to be {unit_m} m, from the floor and the height of the \
+             camera"
         ));
         return;
     }
     tally.count("depth_unit_doubtful");
     tally.note(format!(
-        "the floor in {name} and the height of the camera ({}) say that its unit is {unit_m} m: set \
-         `depth_unit_m = {unit_m}` under [input]",
+        "according to the floor in {name} and the height of the camera ({}), its unit is {unit_m} \
+         m: set `depth_unit_m = {unit_m}` under [input]",
         plan.mount.source()
     ));
 }

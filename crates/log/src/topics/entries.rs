@@ -290,7 +290,10 @@ impl Judge<'_> {
         let is_named = self.input.topic_of(sensor.input).is_some();
         if sensor.rank.is_none() && !is_named {
             let remedy = recorded_remedy(&key, name);
-            return ("recorded detections are read if they are named".to_owned(), Some(remedy));
+            return (
+                "recorded detections are read only if their topic is named".to_owned(),
+                Some(remedy),
+            );
         }
         if !self.inputs.uses(sensor.input) {
             return (format!("the pipeline uses no {}", sensor.wanted), None);
@@ -334,5 +337,5 @@ fn empty(topic: &Topic) -> Option<Reason> {
         return Some(("no message was recorded".to_owned(), None));
     }
     let is_lost = topic.undecodable == topic.count;
-    is_lost.then(|| (format!("its {} messages are not as their type says", topic.count), None))
+    is_lost.then(|| (format!("its {} messages do not match their type", topic.count), None))
 }

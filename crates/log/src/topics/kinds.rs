@@ -67,13 +67,13 @@ const NO_KEY_REMEDY: &str = "no key picture with its parameters is in the log, a
                              one: record from the start of the stream, or let the encoder repeat them";
 
 /// Reason for pictures of depth, as coloured for people to look at, and their remedy.
-const DEPTH_AS_PICTURE: &str = "its name says depth, and its pixels are a picture, from which no distances \
-                                can be read";
+const DEPTH_AS_PICTURE: &str = "its name says depth, but its pixels are a picture, which has no \
+                                distances";
 const DEPTH_AS_PICTURE_REMEDY: &str = "record the raw topic, or its compressedDepth";
 
 /// Remedy for depth as JPEG.
-const JPEG_REMEDY: &str = "JPEG keeps 8 of the 16 bits of depth, so that no distances are left: \
-                           record the raw topic, or its compressedDepth";
+const JPEG_REMEDY: &str = "JPEG keeps 8 of the 16 bits of depth, so the distances are lost: record \
+                           the raw topic, or its compressedDepth";
 /// Remedy for grey images of 16 bits in a codec that is used for depth.
 const DEEP_REMEDY: &str = "grey images of 16 bits are no colour images; they could be depth: if \
                            they are, name the topic as `depth_topic` under [input], with its unit \
@@ -131,7 +131,8 @@ pub(super) fn unread_encoding(encoding: &str) -> Option<(String, &'static str)> 
         return None;
     }
     let why = format!(
-        "its messages are in `{encoding}`, and those of ROS 2 (`cdr`) and ROS 1 (`ros1`) are read"
+        "its messages are in `{encoding}`, but only those of ROS 2 (`cdr`) and ROS 1 (`ros1`) can \
+         be read"
     );
     Some((why, "record with `ros2 bag record`, or convert the log"))
 }

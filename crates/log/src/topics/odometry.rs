@@ -150,7 +150,8 @@ fn lag_problem(frames: &Topic, poses: &Topic) -> Option<Problem> {
 /// Returns the problem of stamps that are another time than those of the frames, in words.
 fn lag_of(off: String) -> Option<Problem> {
     let why = format!(
-        "its stamps are {off} than those of the frames, by the times of recording: another clock"
+        "compared by the times of recording, its stamps are {off} than those of the frames: \
+         another clock"
     );
     Problem::new(why, RECORDING)
 }

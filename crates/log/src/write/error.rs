@@ -33,7 +33,7 @@ pub enum WriteError {
         output: PathBuf,
     },
     /// Another run, or another program of this kind, is writing there.
-    #[error("another run is writing {}; wait for its end, or give another name", path.display())]
+    #[error("another run is writing {}; wait until it ends, or give another name", path.display())]
     Busy {
         /// Output directory, or file.
         path: PathBuf,

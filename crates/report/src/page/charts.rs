@@ -20,8 +20,8 @@ impl Page<'_> {
             self.view.logs.iter().filter_map(|log| self.miss_rate(log)).collect();
         (!charts.is_empty()).then(|| html! {
             p {
-                "People missed against false reports, as the least score that is accepted falls. Lower is better. "
-                "LAMR is the geometric mean of the curve at nine places in the shaded band."
+                "Miss rate against false positives per image while the score threshold falls. Lower is better. "
+                "LAMR is the geometric mean of the curve at nine points in the shaded band."
                 " A pipeline with fewer than " (FEW_SCORES) " different scores on a log has no line there."
                 (self.of_the_best())
             }
@@ -109,7 +109,7 @@ impl Page<'_> {
         let tables: Vec<Markup> =
             self.view.pipelines.iter().filter_map(|p| self.funnel(p)).collect();
         (!tables.is_empty()).then(|| html! {
-            p { "Each test in its order and how many candidates it dropped, over all logs. When somebody is never found, look here first." }
+            p { "The tests in their order, and how many candidates each one dropped, over all logs. If a person is never found, look here first." }
             details class="print" { summary { "Tests of each pipeline" } div class="funnels" { @for table in &tables { (table) } } }
         })
     }

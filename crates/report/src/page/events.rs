@@ -114,7 +114,7 @@ impl Page<'_> {
                 }
             }
         };
-        let caption = html! { "Events by kind and pipeline, over all tasks. A miss is a time without a reported track, however many frames it lasts." };
+        let caption = html! { "Events by kind and pipeline, over all tasks. A miss is one period without a reported track, of any number of frames." };
         let name = "Events by kind";
         html! {
             details class="print" open[self.view.pipelines.len() <= MOST_UNFOLDED] {
@@ -133,7 +133,8 @@ impl Page<'_> {
         let mut events: Vec<(usize, &EventRow)> = task.events.iter().enumerate().collect();
         events.sort_by(|a, b| a.1.t_s.total_cmp(&b.1.t_s));
         let body = html! { @for (index, event) in events { (row(event, &event_id(number, index), self.listed.pictures.contains(&number))) } };
-        let caption = html! { "In time; a time is counted from the first frame of the log." };
+        let caption =
+            html! { "In order of time, which is counted from the first frame of the log." };
         html! {
             details class="events" {
                 summary {

@@ -105,8 +105,8 @@ impl Page<'_> {
         let most_logs = self.summary.pipelines.iter().map(|p| logs_of(p, place)).max().unwrap_or(0);
         let head = html! {
             (column("Pipeline", None))
-            (column("Done", Some("Tasks that ran to their end, of those planned")))
-            @if place == ComparisonSpace::Image { (column("People found", Some("Found at all, with 95 % interval"))) }
+            (column("Done", Some("Tasks that were completed, of those planned")))
+            @if place == ComparisonSpace::Image { (column("People found", Some("People found in at least one frame, with 95 % interval"))) }
             @for figure in &figures { (figure_head(figure)) }
         };
         let body = html! {

@@ -46,15 +46,15 @@ impl Page<'_> {
             html! {
                 p {
                     "Each frame in which an annotated person has no reported track, by the test that dropped the candidate "
-                    "at that person: the last such test, which the candidate came nearest to passing. A predicted "
-                    "track is not reported. " em { (NO_CANDIDATE) } ": no detector proposed anything there."
+                    "at that person: the last one that a candidate reached. A predicted "
+                    "track is not reported. " em { (NO_CANDIDATE) } ": no detector proposed a candidate there."
                 }
                 details class="print" { summary { "Missed people by cause" } (self.missed_by_test()) }
                 @if !self.moments.is_empty() {
                     p {
-                        "Moments in the middle of the longest misses: white and dashed the people, in colour the "
+                        "Frames in the middle of the longest misses: the people white and dashed, in colour the "
                         "tracks of each pipeline" @if self.view.pipelines.len() > MOST_DRAWN { " (of the " (MOST_DRAWN) " best)" }
-                        ", thin and dashed the candidates that were dropped."
+                        ", and thin and dashed the dropped candidates."
                     }
                 }
                 (self.moments())
@@ -93,7 +93,7 @@ impl Page<'_> {
         // The test that costs most comes first.
         tests.sort_by_key(|(test, of)| (std::cmp::Reverse(of.values().sum::<u64>()), *test));
         let head = html! {
-            (column("Cause", None)) (column("Why", Some("With the settings of the first pipeline that has the cause")))
+            (column("Cause", None)) (column("Why", Some("With the settings of the first pipeline in which the cause occurs")))
             @for (rank, p) in self.tried() { (self.column_of(rank, p)) }
         };
         let body = html! {

@@ -85,7 +85,7 @@ impl Page<'_> {
                 @if let Some((pairs, needed)) = self.logs_needed() {
                     ". With " (counted(pairs, "pair")) " that takes " (needed) " logs at least"
                 }
-                ". The interval is Student's, of one pair alone, and no part of that test: it can leave out 0 beside "
+                ". The interval is Student's, for one pair alone, and separate from that test: it can exclude 0 beside "
                 "\"not clear\". The figures are not corrected for each other: choose the one that matters before looking."
             }
             @if self.view.pipelines.len() > 2 { (self.matrix()) }
@@ -99,7 +99,7 @@ impl Page<'_> {
                 }
             }
             @if self.tried().count() > ALL_PAIRS_OF {
-                p { "Described is the best pipeline against the next ones; all pairs are in report.json." }
+                p { "The text compares the best pipeline with the next ones; all pairs are in report.json." }
             }
         })
     }
@@ -216,7 +216,7 @@ impl Page<'_> {
             }
         };
         let caption = html! {
-            (MAIN.name) " " (place_where(place)) ": the pipeline of the row less that of the column, over the logs in common, "
+            (MAIN.name) " " (place_where(place)) ": the pipeline of the row minus that of the column, over the logs in common, "
             "best pipeline first. Bold with an arrow: clear."
         };
         let name = "Each pipeline against each other";
@@ -302,7 +302,7 @@ impl Page<'_> {
             }
         };
         let caption = html! {
-            "Events that happened to one of them only, in time. Events of one kind and person within "
+            "Events that happened to one of them only, in order of time. Events of one kind and person within "
             (number(SAME_EVENT_S, 1)) " s of each other count as the same."
             @if all.len() > most { " The first " (most) " of " (all.len()) "." }
         };

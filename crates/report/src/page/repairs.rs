@@ -22,7 +22,7 @@ impl Page<'_> {
         };
         let body = html! { @for task in &tasks { (self.repair_row(task)) } };
         let caption = html! {
-            "HOTA as it is, and the gain if the truth repaired one kind of error alone; the largest gain in bold."
+            "HOTA as measured, and its gain if one kind of error alone were corrected from the truth; the largest gain in bold."
         };
         Some(html! {
             p { "The largest gain of a row shows the kind of error to work on: identities, false tracks, misses, or positions of the boxes." }

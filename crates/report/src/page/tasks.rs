@@ -50,7 +50,7 @@ impl Page<'_> {
             }
         };
         (!not_done.is_empty() || !lost.is_empty()).then(|| html! {
-            p { "None of these enters a mean. A pipeline with fewer logs than another is marked, and is never called the best." }
+            p { "None of these is in a mean. A pipeline with fewer logs than another is marked, and is never called the best." }
             @if !not_done.is_empty() {
                 details class="print" open[is_open] {
                     summary { (counted(not_done.len(), "task")) }
@@ -78,7 +78,8 @@ impl Page<'_> {
             details class="print" open[constant.len() <= MOST_UNFOLDED] {
                 summary { "LAMR and AP mean nothing in " (counted(constant.len(), "task")) }
                 p {
-                    "Where the reports have fewer than " (FEW_SCORES) " different scores, no threshold tells sure reports from unsure ones; LAMR is left out: "
+                    "Where the reports have fewer than " (FEW_SCORES) " different scores, no \
+                     threshold separates reliable reports from unreliable ones; LAMR is left out: "
                     @for (i, t) in constant.iter().enumerate() { @if i > 0 { ", " } (t.pipeline) " on " (t.log) } "."
                 }
             }
@@ -90,7 +91,7 @@ impl Page<'_> {
             return None;
         }
         let body = html! { @for task in &self.view.tasks { (self.task_row(task)) } };
-        let caption = html! { "In the image where boxes are known, else on the floor. report.csv has every figure of both." };
+        let caption = html! { "In the image if boxes are known, otherwise on the floor. report.csv has every figure of both." };
         Some(html! {
             details class="print" {
                 summary { "One row per pipeline, log and seed" }
@@ -144,7 +145,8 @@ impl Page<'_> {
                 }
             }
         };
-        let caption = html! { "The beginning of each SHA-256; the whole ones are in report.json." };
+        let caption =
+            html! { "The first digits of each SHA-256; the full ones are in report.json." };
         Some(html! {
             p { "Tagalong " (self.view.version) ". A task with the same hash has the same result, to the byte." }
             details { summary { "Hashes of tasks and inputs" } (table("Hashes", &caption, &head, &body)) }
@@ -183,9 +185,9 @@ fn task_head() -> Markup {
     ];
     html! {
         @for name in plain { (column(name, None)) }
-        (column("MT / PT / ML", Some("People tracked mostly, partly and hardly")))
+        (column("MT / PT / ML", Some("People mostly tracked, partly tracked and mostly lost")))
         (column("Error [m]", Some("Mean position error on the floor")))
-        (column("NIS", Some("Mean, its bounds, and what they say of the filter")))
+        (column("NIS", Some("Mean, its bounds, and what they say about the filter")))
     }
 }
 

@@ -218,7 +218,7 @@ pub fn follow(args: &FollowArgs, registry: &Registry) -> Outcome {
     let results = results.map_err(failure)?;
     bar.finish();
     if let Some(signal) = signals.received() {
-        say("stopped; the logs that were written are whole, but end early");
+        say("stopped; the logs that were written are valid, but end early");
         return Ok(Ended::BySignal(signal));
     }
     report(args, seeds, &results)?;
@@ -315,7 +315,8 @@ fn contenders(args: &FollowArgs, registry: &Registry) -> Result<Vec<Contender>, 
             let shown = path.display();
             let steering = steering_configs(registry).join(", ");
             return Err(Failure::usage(format!(
-                "{shown} has no [controller]: it steers no robot; built-in configs with one: {steering}"
+                "{shown} has no [controller], so it drives no robot; built-in configs with one: \
+                 {steering}"
             )));
         }
         contenders.push(contender(&file));

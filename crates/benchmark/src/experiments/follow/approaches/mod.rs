@@ -180,8 +180,8 @@ fn read_scene(job: &Job<'_>, args: &FollowArgs) -> Result<Scene, Failure> {
     let Some(approach) = &scene.approach else {
         let shown = job.path.display();
         return Err(Failure::usage(format!(
-            "{shown} has no table [approach]: nothing comes at the robot in it; add one, or leave \
-             out the scene for {SCENE}"
+            "{shown} has no table [approach], so nothing approaches the robot in it; add one, or \
+             leave out the scene for {SCENE}"
         )));
     };
     let arrives_s = approach.arrives_s();
