@@ -570,6 +570,33 @@ fn all_scanners_of_the_robot_are_used_and_others_are_told() {
 }
 
 #[test]
+fn a_further_scanner_that_falls_silent_or_reads_nothing_is_told() {
+    for (last, range, told) in [
+        (40, 2.0, None),
+        (10, 2.0, Some("/scan_rear has scans within 0.25 s of 12 of 40 frames")),
+        (40, f32::NAN, Some("/scan_rear: none of its 40 scans has a range between")),
+        (40, f32::INFINITY, Some("/scan_rear: none of its 40 scans has a range between")),
+    ] {
+        let mut log = LogWriter::plain();
+        log.fixed("base_link", "front", &Isometry3::translation(0.2, 0.0, 0.3));
+        log.fixed("base_link", "rear", &Isometry3::translation(-0.2, 0.0, 0.3));
+        for index in 0..40 {
+            let stamp = at(0.1 * f64::from(index));
+            log.message("/scan", stamp, &sweep(stamp, "front"));
+            if index < last {
+                let ranges = vec![range; 101];
+                log.message("/scan_rear", stamp, &LaserScan { ranges, ..sweep(stamp, "rear") });
+            }
+        }
+        let (mut source, _saved) = open(log, Inputs::NONE.require(Input::Laser));
+        while source.next_frame().is_some() {}
+        let note = source.notes().iter().find(|note| note.starts_with("/scan_rear"));
+        assert_eq!(note.is_some(), told.is_some(), "{:?}", source.notes());
+        assert!(note.is_none_or(|note| note.contains(told.unwrap())), "{note:?}");
+    }
+}
+
+#[test]
 fn a_further_scanner_that_cannot_be_could_be_one() {
     let mut log = LogWriter::plain();
     log.fixed("base_link", "front", &Isometry3::translation(0.2, 0.0, 0.3));
