@@ -138,7 +138,7 @@ fn times(out: &mut String, timings: &Timings, period_ms: Option<f64>, args: &Run
         let log = quoted(&args.log().display().to_string());
         let _ = writeln!(
             out,
-            "  {slow};\n  `tagalong doctor {log}` prints the time of each pipeline; a network can \
+            "  {slow};\n  `tagalong doctor {log}` prints the time of each pipeline; a detector can \
              run in every Nth frame only (`every = N` beside its `plugin`)"
         );
     }
