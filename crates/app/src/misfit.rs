@@ -1,20 +1,20 @@
-//! Logs and scenes that a config was not made for, by its `[suits]`.
+//! Logs and scenes for which a config is not suitable, according to its `[suits]`.
 
 use tagalong_log::FrameSource;
 use tagalong_math::counted;
 use tagalong_pipeline::Suits;
 
-/// Deviation of the pitch of the camera from the stated range that does not matter, degrees.
+/// Tolerance of the camera's pitch outside of the stated range, degrees.
 const PITCH_TOLERANCE_DEG: f64 = 3.0;
 
-/// Properties of a log or a scene that `[suits]` of a config may speak of.
+/// Properties of a log or a scene that `[suits]` of a config can refer to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Traits {
-    /// Height of the camera above the floor, m; `None` without a camera, or where it is not known.
+    /// Height of the camera above the floor, m; `None` without a camera, or if it is not known.
     pub camera_height_m: Option<f64>,
     /// Angle of its optical axis below the horizon, degrees, likewise.
     pub pitch_down_deg: Option<f64>,
-    /// Distance of the right camera from the left one, m; `None` without a pair.
+    /// Baseline: distance of the right camera from the left one, m; `None` without a pair.
     pub baseline_m: Option<f64>,
     /// True if the motion of the robot is known.
     pub has_odometry: bool,
@@ -34,7 +34,7 @@ impl Traits {
         }
     }
 
-    /// Returns a sentence for each property that does not fit a config; none where all fit.
+    /// Returns a sentence for each property that does not fit a config; empty if all fit.
     pub fn misfits(&self, suits: &Suits) -> Vec<String> {
         let mut found = Vec::new();
         if suits.odometry && !self.has_odometry {
@@ -69,14 +69,14 @@ impl Traits {
     }
 }
 
-/// Logs, or scenes, each with the reasons for which a config does not suit it; none where it does.
+/// Logs, or scenes, each with the reasons why a config is not suitable for it; empty if it is.
 pub type LogMisfits = Vec<(String, Vec<String>)>;
 
 /// Command that leads to better configs for a log.
 pub const COMPARE: &str = "`tagalong doctor LOG` compares the configs that fit";
 
-/// Returns one note for a config and all logs, or scenes, that it does not suit, each with the reasons;
-/// `None` if it suits all.
+/// Returns one note for a config and all logs, or scenes, for which it is not suitable, each with
+/// the reasons; `None` if it suits all.
 pub fn misfit_note(config: &str, unsuited: &[(String, Vec<String>)]) -> Option<String> {
     let unsuited = unsuited.iter().filter(|(_, misfits)| !misfits.is_empty());
     let each: Vec<String> =
@@ -90,8 +90,9 @@ pub fn misfit_note(config: &str, unsuited: &[(String, Vec<String>)]) -> Option<S
     ))
 }
 
-/// Returns one note for all configs: that of [`misfit_note`] where a single one does not suit some logs,
-/// and the names of several with their numbers of logs; `None` if each suits all.
+/// Returns one note for all configs. For a single config that does not suit some logs it is that of
+/// [`misfit_note`]; for several it has their names with the numbers of logs; `None` if each suits
+/// all.
 pub fn misfits_note(configs: &[(String, LogMisfits)]) -> Option<String> {
     let mut each = Vec::new();
     let mut last = None;

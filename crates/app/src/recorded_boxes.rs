@@ -1,4 +1,4 @@
-//! Files of boxes that a config replays, as `recorded` does.
+//! Files of boxes that a config replays, as the config `recorded` does.
 
 use std::collections::BTreeSet;
 
@@ -12,7 +12,7 @@ use crate::config_file::ConfigFile;
 pub struct RecordedBoxes {
     /// The file, as the config names it.
     pub name: String,
-    /// True if its boxes have IDs, as those of tracks.
+    /// True if its boxes have IDs, like those of tracks.
     pub has_ids: bool,
 }
 
@@ -31,7 +31,7 @@ impl RecordedBoxes {
         found
     }
 
-    /// Returns a note on IDs that are passed over.
+    /// Returns a note on IDs that are ignored.
     pub fn note(&self) -> Option<String> {
         let name = &self.name;
         self.has_ids.then(|| {

@@ -1,4 +1,4 @@
-//! Regularity of images, and offsets between those of two topics, by their stamps.
+//! Regularity of images, and time offsets between those of two topics, from their stamps.
 
 use serde::Serialize;
 use tagalong_core::Stamp;
@@ -8,13 +8,13 @@ use tagalong_math::median;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Timing {
-    /// Median of the steps forward, s.
+    /// Median of the forward steps, s.
     pub median_period_s: f64,
-    /// Longest step forward, s.
+    /// Longest forward step, s.
     pub longest_gap_s: f64,
-    /// Number of steps back.
+    /// Number of backward steps.
     pub steps_back: usize,
-    /// Longest step back, s.
+    /// Longest backward step, s.
     pub longest_step_back_s: f64,
     /// Number of stamps equal to the previous one.
     pub repeated: usize,
@@ -41,7 +41,8 @@ impl Timing {
 pub struct Skew {
     /// Median of second minus first over neighbouring images, s.
     pub median_s: f64,
-    /// Fraction of the first topic's images with a second one within the tolerance.
+    /// Fraction of the first topic's images that have an image of the second topic within the
+    /// tolerance.
     pub paired: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Figures of the headline: their names, units and directions.
+//! Figures of merit: their names, units and directions.
 
 use tagalong_eval::Scores;
 
@@ -14,7 +14,7 @@ pub enum ComparisonSpace {
 impl ComparisonSpace {
     pub const ALL: [Self; 2] = [Self::Image, Self::Floor];
 
-    /// Returns the prefix of the keys of figures.
+    /// Returns the prefix of the keys of its figures.
     pub const fn key(self) -> &'static str {
         match self {
             Self::Image => "image",
@@ -42,15 +42,16 @@ pub struct Figure {
     pub range: [f64; 2],
     /// Meaning, in one line.
     pub meaning: &'static str,
-    /// Spaces in which it is shown.
+    /// Spaces in which the figure is shown.
     pub places: &'static [ComparisonSpace],
-    /// True if pipelines are compared by it in pairs.
+    /// True if pairs of pipelines are compared by it.
     pub compared: bool,
     of: fn(&Scores) -> Option<f64>,
 }
 
 impl Figure {
-    /// Returns the figure of a task, if it is finite; of single frames none that needs more than one.
+    /// Returns the value of the figure for a task, if it is finite; `None` for single frames if the
+    /// figure needs several.
     pub fn of(&self, place: ComparisonSpace, task: &TaskResult) -> Option<f64> {
         if task.single_frames && OVER_TIME.contains(&self.name) {
             return None;
@@ -68,7 +69,8 @@ impl Figure {
         if self.higher_is_better { a > b } else { a < b }
     }
 
-    /// Returns true if `a` is better than `b` also with the decimals that a page prints.
+    /// Returns true if `a` is better than `b` even after rounding to the decimals that a page
+    /// prints.
     pub fn better_as_printed(&self, a: f64, b: f64) -> bool {
         let parts = 10_f64.powi(self.decimals as i32);
         self.better((a * parts).round(), (b * parts).round())
@@ -80,21 +82,23 @@ impl Figure {
     }
 }
 
-/// Different scores of which the miss rate over false reports is a curve: of fewer it is some points.
+/// Number of distinct scores from which the plot of miss rate against false positives is a curve
+/// rather than a few points.
 pub const FEW_SCORES: u64 = 10;
 
-/// Returns true if the reports have so few different scores that figures over them tell little.
+/// Returns true if the reports have so few distinct scores that figures over scores have little
+/// meaning.
 pub fn has_few_scores(scores: &Scores) -> bool {
     // Results of earlier versions did not count them.
     (1..FEW_SCORES).contains(&scores.distinct_scores)
 }
 
-/// Returns the figure unless the reports have so few scores that it tells little.
+/// Returns the log-average miss rate, unless the reports have too few distinct scores for it.
 pub fn lamr_of_enough_scores(scores: &Scores) -> Option<f64> {
     scores.lamr.filter(|_| !has_few_scores(scores))
 }
 
-/// Figures of what happens over several frames.
+/// Figures of events over several frames.
 const OVER_TIME: [&str; 8] = [
     "HOTA",
     "AssA",

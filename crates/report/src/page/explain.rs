@@ -47,7 +47,7 @@ fn figures() -> Markup {
     let all = ComparisonSpace::ALL
         .into_iter()
         .flat_map(Figure::at)
-        // Figures of both spaces are explained once.
+        // Figures that occur in both spaces are explained once.
         .filter(|f| known.insert(f.name))
         .collect::<Vec<_>>();
     html! {

@@ -5,11 +5,11 @@ use super::{Page, cell, column, no_cell, optional_cell, signed, table};
 use crate::chart::key;
 use crate::model::TaskResult;
 
-/// Most rows that are shown without being asked for.
+/// Maximum number of rows that are not folded.
 const MOST_OPEN: usize = 6;
 
 impl Page<'_> {
-    /// Renders the HOTA of each task, and the gain by repairing one kind of error alone.
+    /// Renders the HOTA of each task, and the gain from repairing each kind of error alone.
     pub(super) fn repairs(&self) -> Option<Markup> {
         let tasks = self.view.tasks.iter().copied();
         let tasks: Vec<&TaskResult> = tasks.filter(|task| !task.repairs.is_empty()).collect();
@@ -56,7 +56,7 @@ impl Page<'_> {
     }
 }
 
-/// The gain of HOTA by a repair.
+/// Returns the gain in HOTA from a repair.
 fn gain_of(row: &Repaired, hota: Option<f64>) -> Option<f64> {
     Some(row.hota? - hota?)
 }

@@ -135,7 +135,7 @@ fn stage_rows(times: &[&TaskTiming]) -> Vec<StageRow> {
         .map(|t| [t.frame_ms_p50, t.frame_ms_p95, t.frame_ms_p99, t.frame_ms_max])
         .collect();
     let mut by_stage: BTreeMap<&str, Vec<[f64; 4]>> = BTreeMap::new();
-    // The map sorts by name; the rows keep the order of the pipeline.
+    // The map sorts by name, but the rows keep the order of the pipeline.
     let mut order: Vec<&str> = Vec::new();
     for stage in times.iter().flat_map(|t| &t.stages) {
         if !order.contains(&stage.stage.as_str()) {

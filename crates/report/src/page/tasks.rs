@@ -9,10 +9,10 @@ use crate::chart::key;
 use crate::figures::{ComparisonSpace, FEW_SCORES, has_few_scores, lamr_of_enough_scores};
 use crate::model::{Outcome, TaskResult};
 
-/// Name of an outcome that is a fault, not a choice.
+/// Name of an outcome that is an error, not a choice.
 const FAILED: &str = "failed";
 
-/// Returns tasks by outcome and reason: one reason may skip a pipeline on many logs.
+/// Returns tasks by outcome and reason, because one reason may skip a pipeline on many logs.
 fn by_reason<'a>(
     tasks: &[(&'a TaskResult, (&'a str, &'a str))],
 ) -> BTreeMap<(&'a str, &'a str), Vec<&'a TaskResult>> {
@@ -23,7 +23,7 @@ fn by_reason<'a>(
     reasons
 }
 
-/// Returns the different names in tasks, in their order.
+/// Returns the distinct names in tasks, in alphabetical order.
 fn names<'a>(tasks: &[&'a TaskResult], name: fn(&TaskResult) -> &String) -> BTreeSet<&'a str> {
     tasks.iter().copied().map(|task| name(task).as_str()).collect()
 }
@@ -34,7 +34,8 @@ impl Page<'_> {
             self.view.tasks.iter().filter_map(|t| Some((*t, reason(&t.outcome)?))).collect();
         let lost: Vec<&TaskResult> =
             self.view.tasks.iter().copied().filter(|t| t.data_lost).collect();
-        // Failures are to be seen; of skipped tasks, which no log suits, there may be hundreds.
+        // Failures must be visible; of tasks that are skipped because no log fits there may be
+        // hundreds.
         let is_open = not_done.len() <= MOST_UNFOLDED
             || not_done.iter().any(|(_, (outcome, _))| *outcome == FAILED);
         let head = html! { (column("Pipelines", None)) (column("Logs", None)) (column("Tasks", None)) (column("Outcome", None)) (column("Why", None)) };
@@ -63,7 +64,7 @@ impl Page<'_> {
         })
     }
 
-    /// Names the tasks with a meaningless LAMR because all scores, or nearly all, are equal.
+    /// Names the tasks whose LAMR has no meaning because all scores, or nearly all, are equal.
     pub(super) fn constant_scores(&self) -> Option<Markup> {
         let constant: Vec<&TaskResult> = self
             .view
