@@ -125,8 +125,7 @@ impl Diagnosis {
         let evidence = &visit.evidence;
         let resolved = visit.outer.resolved_with(visit.pipeline.config())?;
         let resolved = resolved.values();
-        let found = checks::ALL.iter().filter_map(|check| check(evidence));
-        let findings = found.map(|finding| Finding {
+        let findings = checks::findings(evidence).into_iter().map(|finding| Finding {
             remedy: finding.remedy.as_deref().and_then(|text| present::differing(text, resolved)),
             ..finding
         });

@@ -34,6 +34,10 @@ pub struct Evidence {
     pub config: String,
     /// Contents of the log.
     pub inspection: Inspection,
+    /// Remarks of the reader on what was lost.
+    pub losses: Vec<String>,
+    /// Remarks of the reader on images that make no frame although nothing was lost.
+    pub frameless: Vec<String>,
     /// Reason why the pipeline lacks an input that it requires.
     pub refusal: Option<LogError>,
     /// Source that the controller lacks.
@@ -197,8 +201,8 @@ pub struct Samples {
     pub overlap: EdgeOverlap,
     /// Floor in each frame in which it was found, with the camera of that frame.
     pub floors: Vec<(Ground, Arc<Camera>)>,
-    /// Laser scans.
-    pub scans: Scans,
+    /// Laser scans, those of the first scanner first.
+    pub scans: Vec<Scans>,
 }
 
 impl Samples {
@@ -212,15 +216,16 @@ impl Samples {
             depths: Vec::new(),
             overlap: EdgeOverlap::new(OverlapSettings::default()),
             floors: Vec::new(),
-            scans: Scans::default(),
+            scans: Vec::new(),
         }
     }
 
     /// Measures the frame if it is selected.
     pub fn take(&mut self, number: u64, item: &LogFrame) {
         // Scans are cheap, and the number of rays is that of the longest one.
-        if let Some(scan) = item.frame.laser() {
-            self.scans.take(scan);
+        self.take_scan(0, item.frame.laser());
+        for (place, scan) in item.frame.further_scans().iter().enumerate() {
+            self.take_scan(place + 1, scan.as_ref());
         }
         if !number.is_multiple_of(self.every) {
             return;
@@ -243,6 +248,17 @@ impl Samples {
         }
         let floor = ground_of_depth(&depth, &frame.camera, &GroundSettings::default());
         self.floors.extend(floor.map(|floor| (floor, Arc::clone(&frame.camera))));
+    }
+}
+
+impl Samples {
+    /// Measures the scan of a scanner, if it has one.
+    fn take_scan(&mut self, scanner: usize, scan: Option<&LaserScan>) {
+        let Some(scan) = scan else { return };
+        if self.scans.len() <= scanner {
+            self.scans.resize(scanner + 1, Scans::default());
+        }
+        self.scans[scanner].take(scan);
     }
 }
 
@@ -271,6 +287,19 @@ mod tests {
             driven.take(&Frame::new(1, Stamp::default(), camera, motion, Images::default()));
         }
         driven.moves_camera()
+    }
+
+    #[test]
+    fn scans_are_counted_for_each_scanner() {
+        let mut samples = Samples::of(3);
+        let met = LaserScan::of_points(vec![nalgebra::Point3::new(2.0, 0.0, 0.0)]);
+        samples.take_scan(2, Some(&met));
+        samples.take_scan(0, Some(&met));
+        samples.take_scan(0, None);
+        samples.take_scan(0, Some(&LaserScan::of_points(Vec::new())));
+        let counts: Vec<usize> = samples.scans.iter().map(|scans| scans.count).collect();
+        let readings: Vec<usize> = samples.scans.iter().map(|scans| scans.readings).collect();
+        assert_eq!((counts, readings), (vec![2, 0, 1], vec![1, 0, 1]));
     }
 
     #[test]

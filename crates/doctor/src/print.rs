@@ -28,10 +28,7 @@ pub fn text(diagnosis: &Diagnosis) -> String {
         out.push('\n');
     }
     diagnosis.findings.iter().for_each(|found| finding(&mut out, found));
-    if let Some(slow) = diagnosis.period_ms.and_then(|ms| too_slow(diagnosis.coverage.frame_ms, ms))
-    {
-        let _ = writeln!(out, "\n{slow}; `tagalong doctor LOG` prints the time of each pipeline");
-    }
+    too_slow_here(&mut out, diagnosis);
     settings(&mut out, diagnosis);
     if let Some(folder) = &diagnosis.pictures {
         let _ = writeln!(out, "\npictures of frames with their tracks: {}", folder.display());
@@ -58,10 +55,10 @@ fn pipelines(out: &mut String, diagnosis: &Diagnosis) {
         let failure = failure.iter().map(|why| format!(": failed, {why}")).collect::<String>();
         let _ = writeln!(out, "  {}  {frame_ms:>7.1}  {config}{mark}{failure}", figures(coverage));
     }
-    if let Some(why) = &diagnosis.network {
-        let _ = writeln!(out, "  {:>w$}  {:>7}  network: {why}", "-", "-", w = heading().len());
-    }
     let _ = writeln!(out, "{}", legend(&diagnosis.coverage));
+    if let Some(why) = &diagnosis.network {
+        let _ = writeln!(out, "  no network is among them: {why}");
+    }
     slow(out, diagnosis);
     if let Some(taken) = diagnosis.pipelines.iter().find(|row| row.taken) {
         let contents = &diagnosis.contents;
@@ -75,6 +72,19 @@ fn pipelines(out: &mut String, diagnosis: &Diagnosis) {
         better(out, taken, &diagnosis.pipelines);
         out.push('\n');
     }
+}
+
+/// Writes that the pipeline takes longer per frame than the interval between frames of the log.
+fn too_slow_here(out: &mut String, diagnosis: &Diagnosis) {
+    let Some(period_ms) = diagnosis.period_ms else { return };
+    let Some(slow) = too_slow(diagnosis.coverage.frame_ms, period_ms) else { return };
+    // Without a config, the times of all pipelines are printed above.
+    let others = if diagnosis.pipelines.is_empty() {
+        "; `tagalong doctor LOG` prints the time of each pipeline"
+    } else {
+        ""
+    };
+    let _ = writeln!(out, "\n{slow}{others}");
 }
 
 /// Writes which pipelines take longer per frame than the interval between frames of the log.
@@ -214,6 +224,26 @@ mod tests {
         let rows = [taken, other];
         better(&mut out, &rows[0], &rows);
         out
+    }
+
+    #[test]
+    fn a_report_with_the_times_of_all_pipelines_does_not_advise_itself() {
+        let mut diagnosis = Diagnosis { period_ms: Some(40.0), ..Diagnosis::default() };
+        diagnosis.coverage.frame_ms = 80.0;
+        let mut out = String::new();
+        too_slow_here(&mut out, &diagnosis);
+        assert!(
+            out.contains("live, the others are skipped; `tagalong doctor LOG` prints"),
+            "{out}"
+        );
+        diagnosis.pipelines = vec![row("late", 1, 0)];
+        diagnosis.network = Some("install one".to_owned());
+        out.clear();
+        too_slow_here(&mut out, &diagnosis);
+        assert!(out.ends_with("live, the others are skipped\n"), "{out}");
+        // What does not fit is no row of the table of those that do.
+        let printed = text(&diagnosis);
+        assert!(printed.contains("\n  no network is among them: install one\n"), "{printed}");
     }
 
     #[test]

@@ -79,6 +79,8 @@ impl Visit {
             config: config.stem(),
             samples: Samples::of(expected),
             depth: OnceCell::new(),
+            losses: found.inspection.notes.clone(),
+            frameless: Vec::new(),
             inspection: found.inspection,
             refusal: found.refusal,
             missing: None,
@@ -171,4 +173,6 @@ fn look(
     out.inspection.counters = frames.counters().clone();
     out.inspection.notes = frames.notes().to_vec();
     out.inspection.data_lost = frames.data_lost();
+    out.losses = frames.losses().to_vec();
+    out.frameless = frames.frameless().to_vec();
 }

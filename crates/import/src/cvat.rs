@@ -221,11 +221,11 @@ fn number(node: &Node<'_, '_>, name: &str) -> Result<f64, String> {
 
 /// Returns an attribute that is a whole number from 0 to `most`.
 fn whole_number(node: &Node<'_, '_>, name: &str, most: i64) -> Result<i64, String> {
-    let value = number(node, name)?;
-    if value.fract() == 0.0 && (0.0..=most as f64).contains(&value) {
-        return Ok(value as i64);
-    }
-    Err(at(node, &format!("`{name}` is `{value}`, expected a whole number from 0 to {most}")))
+    let text = node.attribute(name).unwrap_or_default();
+    let value = text.parse::<i64>().ok().filter(|value| (0..=most).contains(value));
+    value.ok_or_else(|| {
+        at(node, &format!("`{name}` is `{text}`, expected a whole number from 0 to {most}"))
+    })
 }
 
 /// Returns the number of a frame, from 1. CVAT counts from 0.
@@ -319,7 +319,10 @@ mod tests {
             (&VIDEO.replace("xbr=\"62.5\"", "xbr=\"2\""), ", line 5: a box without an area"),
             (&VIDEO.replace("frame=\"1\" keyframe=\"0\"", "frame=\"-1\""), "`frame` is `-1`"),
             (&VIDEO.replace("frame=\"0\"", "frame=\"1700000000\""), "line 4: `frame` is `17"),
-            (&VIDEO.replace("id=\"4\"", "id=\"9223372036854775807\""), ", line 8: `id` is `92"),
+            (
+                &VIDEO.replace("id=\"4\"", "id=\"9223372036854775807\""),
+                "`id` is `9223372036854775807`,",
+            ),
             (&VIDEO.replace("id=\"4\"", "id=\"1e400\""), ", line 8: `id` is `1e400`"),
             (&VIDEO.replace("id=\"4\"", "id=\"0.5\""), ", line 8: `id` is `0.5`"),
             (

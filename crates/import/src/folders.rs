@@ -62,7 +62,7 @@ pub fn mot(args: &ImportArgs) -> Result<Sequence, Failure> {
     if !folder.exists() {
         return Err(Failure::failed(format!(
             "{}: no such folder, so there are no images; `tagalong boxes FOLDER_OF_SEQUENCES` tracks \
-             the boxes of det/det.txt without them",
+             the boxes of det/det.txt without them; --boxes DIR names the folder of the boxes",
             folder.display()
         )));
     }

@@ -40,7 +40,7 @@ use tagalong_app::unable::unable;
 use tagalong_config::Registry;
 use tagalong_core::Stamp;
 use tagalong_log::write::{FrameNames, FrameRecord, RunDir, RunTexts, TrackLog};
-use tagalong_log::{FrameSource, Input, Inputs, Usage};
+use tagalong_log::{FrameSource, Input, Inputs, Usage, is_loss};
 use tagalong_pipeline::{FrameReport, MissingSource, Pipeline, ResolvedConfig, StepError};
 use tagalong_render::{Overlay, OverlayData, background};
 use tagalong_simulate::sample;
@@ -455,19 +455,9 @@ fn about(report: &RunReport) -> BTreeMap<String, String> {
     ])
 }
 
-/// Counters of the reader that are no reason for a missing frame.
-const NO_REASON: [&str; 6] = [
-    "chunks_verified",
-    "chunks_without_crc",
-    "messages",
-    "messages_unpacked",
-    "disparity_pixels",
-    "disparity_pixels_invalid",
-];
-
 /// Returns the message about a log of which no frame could be made.
 fn no_frame(report: &RunReport, args: &RunArgs) -> String {
-    let telling = report.counters.iter().filter(|(name, _)| !NO_REASON.contains(&name.as_str()));
+    let telling = report.counters.iter().filter(|(name, _)| is_loss(name));
     let reasons: Vec<String> =
         telling.map(|(name, count)| format!("{} {count}", name.replace('_', " "))).collect();
     let why =

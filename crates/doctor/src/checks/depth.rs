@@ -92,6 +92,17 @@ fn judged(evidence: &Evidence) -> Option<&JudgedDepth> {
     evidence.depth.get_or_init(|| judge(evidence)).as_ref()
 }
 
+/// Returns the reason for which depth without outlines and shapes tells nothing; `None` where it is used, in
+/// a unit that nothing speaks against.
+pub fn doubt(evidence: &Evidence) -> Option<&'static str> {
+    if evidence.samples.depths.is_empty() {
+        return Some("not known: the depth is not used");
+    }
+    let Some(judged) = judged(evidence) else { return Some("not known: depth has no reading") };
+    let is_doubtful = judged.unit.severity() >= Severity::Warn;
+    is_doubtful.then_some("not known: the unit of depth is in doubt")
+}
+
 fn judge(evidence: &Evidence) -> Option<JudgedDepth> {
     let quality = DepthQuality::of(evidence.samples.depths.iter().map(AsRef::as_ref))?;
     let factor = if is_disparity(evidence) { None } else { measured_factor(evidence) };

@@ -1,27 +1,53 @@
-use super::super::evidence::Evidence;
+use tagalong_log::{Input, InputAccount};
+
+use super::super::evidence::{Evidence, Scans};
 use super::super::finding::{Finding, Severity};
 
 /// Height of legs, m.
 const LEGS_M: std::ops::RangeInclusive<f64> = 0.05..=0.9;
 
-/// Checks the scans of a laser scanner.
-pub fn laser(evidence: &Evidence) -> Option<Finding> {
-    let topic = evidence.inspection.facts.laser_topic.as_ref()?;
-    let scans = &evidence.samples.scans;
-    if scans.count == 0 {
-        let finding = Finding::new("laser", Severity::Warn, format!("{topic}: no usable scan"))
-            .why("scans without angles, ranges or a pose are left out");
-        return Some(
-            finding
-                .remedy("publish tf from the robot to the scanner; [input] laser_topic = \"...\""),
-        );
+/// Share of frames without a usable scan that is a warning, and a serious one.
+const SILENT: (f64, f64) = (0.1, 0.5);
+
+/// Checks the scans of each laser scanner: those of the first one, then of further ones.
+pub fn scanners(evidence: &Evidence) -> Vec<Finding> {
+    let Some(first) = evidence.inspection.facts.laser_topic.as_deref() else { return Vec::new() };
+    let none = Scans::default();
+    let mut found = Vec::new();
+    for (number, topic) in topics(first, &evidence.inspection.inputs).into_iter().enumerate() {
+        let scans = evidence.samples.scans.get(number).unwrap_or(&none);
+        // A pipeline without lasers reads none.
+        if scans.count == 0 && !evidence.inputs.uses(Input::Laser) {
+            continue;
+        }
+        let rate_hz = evidence.inspection.topic(topic).and_then(|topic| topic.rate_hz);
+        found.push(judge(topic, rate_hz, evidence.reading.made, scans));
     }
-    let rate = evidence.inspection.topic(topic).and_then(|topic| topic.rate_hz);
-    let rate = rate.map_or_else(|| "one scan".to_owned(), |hz| format!("{hz:.1} scans a second"));
+    found
+}
+
+/// Returns the topics of the scanners that are used, in the order of [`tagalong_core::FurtherScans`].
+fn topics<'a>(first: &'a str, account: &'a InputAccount) -> Vec<&'a str> {
+    let lasers = account.topics.iter().filter(|topic| topic.used_as.as_deref() == Some("laser"));
+    let further = lasers.map(|topic| topic.topic.as_str()).filter(|topic| *topic != first);
+    std::iter::once(first).chain(further).collect()
+}
+
+/// Judges the scans of one scanner, given the number of frames.
+fn judge(topic: &str, rate_hz: Option<f64>, frames: u64, scans: &Scans) -> Finding {
+    if scans.count == 0 {
+        return Finding::new("laser", Severity::Warn, format!("{topic}: no usable scan"))
+            .why("scans without angles, ranges or a pose are left out")
+            .remedy("publish tf from the robot to the scanner; [input] laser_topic = \"...\"");
+    }
+    let rate =
+        rate_hz.map_or_else(|| "one scan".to_owned(), |hz| format!("{hz:.1} scans a second"));
     let step_deg = scans.increment_rad.to_degrees();
     let valid = scans.valid();
     // Outdoors a scanner has no reflection in most directions, which is not a fault.
-    let severity = Severity::beyond(1.0 - valid, 0.8, 0.97);
+    let few_rays = Severity::beyond(1.0 - valid, 0.8, 0.97);
+    let silent = frames.saturating_sub(scans.count as u64);
+    let silence = Severity::beyond(silent as f64 / frames.max(1) as f64, SILENT.0, SILENT.1);
     let mut measured = format!(
         "{topic}: {rate}, {} rays over {:.0} degrees ({step_deg:.2} each), readings in {:.0} % up to \
          {:.1} m",
@@ -34,20 +60,82 @@ pub fn laser(evidence: &Evidence) -> Option<Finding> {
     if scans.height_m > 0.0 {
         measured += &format!(", {:.2} m above the floor", scans.height_m);
     }
+    if silence > Severity::Ok {
+        measured += &format!("; no usable scan at {silent} of {frames} frames");
+    }
     let is_high = scans.height_m > 0.0 && !LEGS_M.contains(&scans.height_m);
-    let finding = Finding::new("laser", severity.max(wrong_height(is_high)), measured)
+    let severity = few_rays.max(silence).max(wrong_height(is_high));
+    let finding = Finding::new("laser", severity, measured)
         .figure("rays", f64::from(scans.rays))
         .figure("valid", valid)
         .figure("farthest_m", scans.farthest_m)
         .figure("height_m", scans.height_m)
         .why("legs are looked for in the scans, 0.05 to 0.9 m above the floor");
-    Some(finding.remedy(if is_high {
+    finding.remedy(if few_rays > Severity::Ok {
+        "few rays have a return: clean the window; check the range that is set and the driver's filter"
+    } else if is_high {
         "mount the scanner at the height of legs, or correct its transform"
     } else {
-        "few rays have a return: clean the window; check the range that is set and the driver's filter"
-    }))
+        "the scanner, or its tf, stops or pauses: record both throughout"
+    })
 }
 
 fn wrong_height(is_wrong: bool) -> Severity {
     if is_wrong { Severity::Warn } else { Severity::Ok }
+}
+
+#[cfg(test)]
+mod tests {
+    use tagalong_log::TopicUse;
+
+    use super::*;
+
+    fn laser(topic: &str, used_as: Option<&str>) -> TopicUse {
+        TopicUse {
+            topic: topic.to_owned(),
+            kind: "sensor_msgs/LaserScan".to_owned(),
+            camera: None,
+            used_as: used_as.map(str::to_owned),
+            calibration: None,
+            problem: None,
+            could_be: None,
+            remedy: None,
+        }
+    }
+
+    #[test]
+    fn each_scanner_that_is_used_has_its_place() {
+        let mut account = InputAccount::default();
+        account.topics = vec![
+            laser("/a", Some("laser")),
+            laser("/front", Some("laser")),
+            laser("/rear", Some("laser")),
+            laser("/zero", None),
+        ];
+        assert_eq!(topics("/front", &account), ["/front", "/a", "/rear"]);
+    }
+
+    #[test]
+    fn a_scanner_without_readings_and_a_silent_one_are_told() {
+        let good = Scans {
+            count: 40,
+            readings: 40 * 180,
+            rays: 181,
+            increment_rad: 0.01,
+            farthest_m: 5.0,
+            height_m: 0.3,
+        };
+        let told = judge("/rear", Some(10.0), 40, &good);
+        assert_eq!(told.severity, Severity::Ok, "{told:?}");
+        assert!(!told.measured.contains("no usable scan"), "{told:?}");
+        let blind = Scans { readings: 0, farthest_m: 0.0, ..good };
+        let told = judge("/rear", Some(10.0), 40, &blind);
+        assert_eq!(told.severity, Severity::Bad, "{told:?}");
+        assert!(told.remedy.unwrap().contains("few rays have a return"));
+        let ending = Scans { count: 20, readings: 20 * 180, ..good };
+        let told = judge("/rear", Some(10.0), 40, &ending);
+        assert_eq!(told.severity, Severity::Bad, "{told:?}");
+        assert!(told.measured.contains("no usable scan at 20 of 40 frames"), "{told:?}");
+        assert!(told.remedy.unwrap().contains("stops or pauses"));
+    }
 }

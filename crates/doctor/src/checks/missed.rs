@@ -1,5 +1,6 @@
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
+use super::depth::doubt;
 use super::{Alternative, better};
 
 /// Number of blobs below which shares are not significant.
@@ -14,7 +15,8 @@ pub fn missed(evidence: &Evidence) -> Option<Finding> {
         return None;
     }
     if coverage.blobs == 0 {
-        let measured = "no shape of a person's size comes or goes in depth";
+        let measured =
+            doubt(evidence).unwrap_or("no shape of a person's size comes or goes in depth");
         return Some(Finding::new("missed", Severity::Unknown, measured));
     }
     let share = coverage.unexplained as f64 / coverage.blobs as f64;

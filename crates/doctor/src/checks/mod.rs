@@ -31,10 +31,18 @@ use super::evidence::Evidence;
 use super::finding::{Finding, Severity};
 
 /// Function of one check.
-pub type Check = fn(&Evidence) -> Option<Finding>;
+type Check = fn(&Evidence) -> Option<Finding>;
 
-/// All checks, causes before their consequences.
-pub const ALL: &[Check] = &[
+/// Runs all checks, and returns their findings, causes before their consequences.
+pub fn findings(evidence: &Evidence) -> Vec<Finding> {
+    let mut found: Vec<Finding> = BEFORE_LASER.iter().filter_map(|check| check(evidence)).collect();
+    found.extend(laser::scanners(evidence));
+    found.extend(BEHIND_LASER.iter().filter_map(|check| check(evidence)));
+    found
+}
+
+/// Checks before those of the scanners, of which there are as many as scanners.
+const BEFORE_LASER: &[Check] = &[
     needs::needs,
     topics::topics,
     damage::damage,
@@ -52,13 +60,11 @@ pub const ALL: &[Check] = &[
     mount::mount,
     heads::heads,
     suits::suits,
-    laser::laser,
-    odometry::odometry,
-    preparation::preparation,
-    people::people,
-    still::still,
-    missed::missed,
 ];
+
+/// Checks behind those of the scanners.
+const BEHIND_LASER: &[Check] =
+    &[odometry::odometry, preparation::preparation, people::people, still::still, missed::missed];
 
 /// Returns true if tracks disagree with shapes that come and go, so that other settings should be
 /// tried.

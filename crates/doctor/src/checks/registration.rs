@@ -2,6 +2,7 @@ use tagalong_vision::registration::Offset;
 
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
+use super::depth::doubt;
 
 /// Number of columns of the image to which the limits on offsets refer.
 const USUAL_COLUMNS: f64 = 640.0;
@@ -17,7 +18,7 @@ pub fn registration(evidence: &Evidence) -> Option<Finding> {
         return None;
     }
     let Some(offset) = evidence.samples.overlap.offset() else {
-        let why = "no outlines in depth to compare with colour";
+        let why = doubt(evidence).unwrap_or("no outlines in depth to compare with colour");
         return Some(Finding::new("registration", Severity::Unknown, why));
     };
     let [dx, dy] = offset.px;

@@ -58,7 +58,11 @@ pub fn skipped(evidence: &Evidence) -> Option<Finding> {
         .filter(|((severity, _), ..)| *severity > Severity::Ok)
         .collect();
     if found.is_empty() {
-        return Some(Finding::new("skipped", Severity::Ok, "no message was left out"));
+        return Some(Finding::new(
+            "skipped",
+            Severity::Ok,
+            "no message of the topics used was left out",
+        ));
     }
     let severity = found.iter().map(|((severity, _), ..)| *severity).max()?;
     let measured: Vec<String> =
