@@ -73,7 +73,7 @@ impl PyPipeline {
     /// Takes one frame through the pipeline and returns a Report.
     ///
     /// Raises ValueError for a frame that cannot be used, such as one without depth for a pipeline that
-    /// needs it: the frame leads to no command, and the next one is taken as usual.
+    /// needs it: the last command ends, and the next one is taken as usual.
     ///
     /// colour: uint8, rows x columns x 3 (red, green, blue) or rows x columns. depth: float32 in
     /// metres or uint16 in millimetres, registered to colour. camera: a Camera, of the size of the
