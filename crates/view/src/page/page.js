@@ -120,7 +120,7 @@
       : track.state === "stale" ? "stale, of a frozen image" : track.state);
   // Neither has the colour of a person in sight.
   const isGrey = (track) => track.state === "tentative" || track.state === "stale";
-  // The distance, with `~` before one that is a guess.
+  // The distance from the middle of the robot, with `~` before one that is a guess.
   const away = (track, digits) => `${track.guess ? "~" : ""}${fixed(track.d, digits)} m`;
   const trackKind = (track) =>
     track.state === "seen" ? colour(track.id)
@@ -185,7 +185,7 @@
   };
 
   const describe = (track) =>
-    `track ${track.id}, ${stateOf(track)}, ${away(track, 1)} away, ${fixed(Math.hypot(...track.v), 1)} m/s`;
+    `track ${track.id}, ${stateOf(track)}, ${away(track, 1)} from the middle of the robot, ${fixed(Math.hypot(...track.v), 1)} m/s`;
 
   // ---- plan ------------------------------------------------------------------------------------
 
@@ -528,7 +528,7 @@
 
   // ---- tables ----------------------------------------------------------------------------------
 
-  const NUMBERS = ["Distance", "Speed", "Probability", "Number"];
+  const NUMBERS = ["From the robot's middle", "Speed", "Probability", "Number"];
   const table = (caption, heads, rows) =>
     el("div", { class: "scroll", role: "region", "aria-label": caption, tabindex: "0" }, el("table", {},
       el("thead", {}, el("tr", {}, ...heads.map((head) => el("th", { scope: "col", class: NUMBERS.includes(head) ? "number" : "" }, head)))),
@@ -543,7 +543,7 @@
     const row = (track) => el("tr", {},
       el("th", { scope: "row" }, el("span", { class: `swatch ${colour(track.id)}` }), String(track.id)),
       el("td", {}, stateOf(track)), number(away(track, 2)), number(`${fixed(Math.hypot(...track.v), 2)} m/s`), number(fixed(track.p, 2)));
-    return place.replaceChildren(table(`People of ${run.name}`, ["Track", "State", "Distance", "Speed", "Probability"], tracks.map(row)));
+    return place.replaceChildren(table(`People of ${run.name}`, ["Track", "State", "From the robot's middle", "Speed", "Probability"], tracks.map(row)));
   };
 
   const settings = (run, test) => {
