@@ -41,9 +41,9 @@ impl Pipeline {
     /// [`Frame::odometry_jumped`] the robot stops until [`Pipeline::arm`].
     ///
     /// # Errors
-    /// [`StepError::Lacks`] for a frame without an input that a plugin requires: no plugin sees it, it
-    /// leads to no command, and the next frame is taken as usual. Another [`StepError`] if a plugin
-    /// fails or panics: the pipeline is stopped then, and each further call fails.
+    /// [`StepError::Lacks`] for a frame without an input that a plugin requires: no plugin sees it, the
+    /// last command ends at once, and the next frame is taken as usual. Another [`StepError`] if a
+    /// plugin fails or panics: the pipeline is stopped then, and each further call fails.
     pub fn step(&mut self, frame: impl AsRef<Frame>) -> Result<FrameReport, StepError> {
         self.step_frame(frame.as_ref())
     }
@@ -66,10 +66,17 @@ impl Pipeline {
         let report = self
             .process(restricted.as_ref().unwrap_or(frame))
             .map_err(|error| error.blame_declaration(frame));
-        let is_refused = matches!(report, Err(StepError::Lacks { .. }));
-        if report.is_err() && !is_refused {
-            self.failed = Some(frame.index);
-            self.disarm("a plugin failed");
+        match &report {
+            Ok(_) => {}
+            Err(StepError::Lacks { .. }) => {
+                if let Some(steering) = &mut self.steering {
+                    steering.pass_over(frame);
+                }
+            }
+            Err(_) => {
+                self.failed = Some(frame.index);
+                self.disarm("a plugin failed");
+            }
         }
         report
     }

@@ -26,6 +26,11 @@ pub struct OverlayData {
 }
 
 impl OverlayData {
+    /// Returns true if boxes and places are those of a frozen image, not of now.
+    pub(crate) fn shows_past(&self) -> bool {
+        self.report.shows_past()
+    }
+
     /// Returns the data of a frame.
     pub fn of(frame: &Frame, odom_from_robot: Isometry2<f64>, report: FrameReport) -> Self {
         let points = frame.scan().map_or(&[][..], |scan| &scan.points);

@@ -39,7 +39,7 @@ pub fn draw(scene: &OverlayData, trails: &Trails, style: OverlayStyle) -> Canvas
     }
     let mut labels = labels(scene, by, style);
     // Tracks come last, so that nothing hides them.
-    let shown = scene.report.visualisation.as_ref();
+    let shown = scene.report.visualisation.as_ref().filter(|_| !scene.shows_past());
     if let Some(sketch) = shown.and_then(|shown| shown.downcast_ref::<Sketch>()) {
         view.draw_silhouettes(sketch);
         if style.is_debug() {
@@ -53,7 +53,12 @@ pub fn draw(scene: &OverlayData, trails: &Trails, style: OverlayStyle) -> Canvas
     // Far to near, so that near people cover far ones.
     for track in style.tracks(scene).rev() {
         let region = view.scaled(&style.region(scene, track));
-        draw_box(&mut view.canvas, &region, track.seen, colour(track));
+        draw_box(
+            &mut view.canvas,
+            &region,
+            track.seen && !scene.shows_past(),
+            colour(scene, track),
+        );
     }
     view.draw_joints(scene, style);
     add_labels(&mut labels, scene, by, style);
@@ -88,8 +93,8 @@ pub fn add_labels(labels: &mut Labels, scene: &OverlayData, by: usize, style: Ov
             continue;
         }
         let region = scaled(&region, by as f64);
-        let name = name_of(track, scene.report.target == Some(track.id));
-        labels.add(&region, name, lettering, colour(track));
+        let name = name_of(scene, track);
+        labels.add(&region, name, lettering, colour(scene, track));
     }
     for (region, test) in dropped(scene).into_iter().filter(|_| style.is_debug()) {
         labels.add_if_room(&scaled(&region, by as f64), test, Lettering::Small, DROPPED.faint(1.0));
@@ -201,7 +206,7 @@ impl ImageView {
             let Some((_, joints)) = joints.iter().find(|(id, _)| *id == track.id) else { continue };
             for [from, to] in joints.bones() {
                 let ends = [self.pixel(&from), self.pixel(&to)];
-                self.canvas.thick_path(&ends, colour(track));
+                self.canvas.thick_path(&ends, colour(scene, track));
             }
         }
     }
@@ -253,10 +258,11 @@ fn dropped(scene: &OverlayData) -> Vec<(Rect, String)> {
 }
 
 /// Returns the ID of a track, whether it is the target, its state, and its distance from the robot.
-fn name_of(track: &Track, is_target: bool) -> String {
-    let target = if is_target { " target" } else { "" };
+fn name_of(scene: &OverlayData, track: &Track) -> String {
+    let target = if scene.report.target == Some(track.id) { " target" } else { "" };
     let state = match (track.confirmed, track.seen) {
         (false, _) => "?",
+        _ if scene.shows_past() => " stale",
         (true, true) => "",
         (true, false) => " predicted",
     };

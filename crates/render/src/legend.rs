@@ -64,11 +64,13 @@ fn title(scene: &OverlayData, trails: &Trails, style: OverlayStyle) -> String {
     format!("frame {}   {s}.{ms:03} s   {people}{drive}", scene.report.index)
 }
 
-/// Returns the number of visible people in words, or that the frame was not used.
+/// Returns the number of visible people in words, or that the frame was not used or is that of a
+/// frozen camera.
 fn seen(scene: &OverlayData) -> String {
     match scene.report.outcome {
         Outcome::OutOfOrder => return "late, not used".to_owned(),
         Outcome::Duplicate => return "repeated, not used".to_owned(),
+        _ if scene.shows_past() => return "frozen image, places are old".to_owned(),
         _ => {}
     }
     match scene.report.tracks.iter().filter(|t| t.confirmed && t.seen).count() {

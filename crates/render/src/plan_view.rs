@@ -92,9 +92,9 @@ pub fn draw(scene: &OverlayData, trails: &Trails, style: OverlayStyle, height: u
         canvas.thick_path(&points, colour_of(id).faint(0.7));
     }
     for track in style.tracks(scene).rev() {
-        draw_track(&mut canvas, &plan, track, scene.report.target == Some(track.id));
+        draw_track(&mut canvas, &plan, scene, track);
         if style.is_debug() {
-            draw_uncertainty(&mut canvas, &plan, track);
+            draw_uncertainty(&mut canvas, &plan, track, colour(scene, track));
         }
     }
     labels(scene, &plan, style, height).paint(&mut canvas);
@@ -111,7 +111,7 @@ fn labels(scene: &OverlayData, plan: &Plan, style: OverlayStyle, height: usize) 
     for track in style.tracks(scene).filter(|track| plan.shows(track, height)) {
         let is_target = scene.report.target == Some(track.id);
         let text = if is_target { format!("{} target", track.id) } else { track.id.to_string() };
-        labels.add(&plan.mark(track), text, Lettering::Bold, colour(track));
+        labels.add(&plan.mark(track), text, Lettering::Bold, colour(scene, track));
     }
     labels
 }
@@ -168,16 +168,21 @@ fn draw_field_of_view(canvas: &mut Canvas, plan: &Plan, scene: &OverlayData) {
     }
 }
 
-fn draw_track(canvas: &mut Canvas, plan: &Plan, track: &Track, target: bool) {
-    let ink = colour(track);
+fn draw_track(canvas: &mut Canvas, plan: &Plan, scene: &OverlayData, track: &Track) {
+    let ink = colour(scene, track);
     let person = &track.estimate.person;
     let at = plan.of(&person.position);
-    let opacity = if track.seen { 1.0 } else { 0.5 };
-    let radius = if target { 7.0 } else { 5.0 };
-    if track.seen {
+    let is_seen = track.seen && !scene.shows_past();
+    let opacity = if is_seen { 1.0 } else { 0.5 };
+    let radius = if scene.report.target == Some(track.id) { 7.0 } else { 5.0 };
+    if is_seen {
         canvas.disc(at, radius, ink);
     } else {
         draw_ring(canvas, at, radius, ink);
+    }
+    // Of an earlier time nothing is known of the next second.
+    if scene.shows_past() {
+        return;
     }
     // The line ends where the person will be in one second.
     let soon = person.position.xy() + person.velocity;
@@ -191,10 +196,10 @@ pub(super) fn draw_ring(canvas: &mut Canvas, at: Point2<f64>, radius: f64, ink: 
 }
 
 /// Renders the ellipse of two standard deviations.
-fn draw_uncertainty(canvas: &mut Canvas, plan: &Plan, track: &Track) {
+fn draw_uncertainty(canvas: &mut Canvas, plan: &Plan, track: &Track, ink: Ink) {
     let person = &track.estimate.person;
     let covariance = track.estimate.covariance.fixed_view::<2, 2>(0, 0).into_owned();
-    canvas.path(&ellipse(plan, &person.position, covariance), colour(track).faint(0.6));
+    canvas.path(&ellipse(plan, &person.position, covariance), ink.faint(0.6));
 }
 
 /// Returns the ellipse of two standard deviations around a position on the floor.

@@ -70,9 +70,9 @@ impl OverlayStyle {
 /// Colour of everything that is not a confirmed track.
 pub(crate) const TENTATIVE: Ink = Ink::solid([190, 190, 190]);
 
-/// Returns the colour of a track: grey until it is confirmed.
-pub(crate) fn colour(track: &Track) -> Ink {
-    if track.confirmed { colour_of(track.id) } else { TENTATIVE }
+/// Returns the colour of a track: grey until it is confirmed, and in a frozen image.
+pub(crate) fn colour(scene: &OverlayData, track: &Track) -> Ink {
+    if track.confirmed && !scene.shows_past() { colour_of(track.id) } else { TENTATIVE }
 }
 
 /// Returns the colour of the tracks of an ID.

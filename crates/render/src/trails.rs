@@ -25,9 +25,12 @@ impl Trails {
     }
 
     /// Returns the trails of the tracks that are seen in the present frame, in the robot frame, in
-    /// pieces without gaps.
+    /// pieces without gaps; none in a frozen image.
     pub fn in_robot(&self, scene: &OverlayData) -> Vec<(TrackId, Vec<Point3<f64>>)> {
         let mut pieces = Vec::new();
+        if scene.shows_past() {
+            return pieces;
+        }
         for track in scene.report.tracks.iter().filter(|track| track.seen) {
             for mut piece in self.trails.pieces(track.id) {
                 for place in &mut piece {

@@ -208,7 +208,7 @@ impl RideFacts {
         let stands = self.never_moved.as_ref();
         let stands = stands.map_or(String::new(), |why| format!("; the robot never moved ({why})"));
         format!(
-            "{}{stands}{}; least room to people {}, to things {}; distance kept for {share} of the time in \
+            "{}{stands}{}; least room from the edge of the robot to people {}, to things {}; distance kept for {share} of the time in \
              which the person was followed and walked slowly; {wrong}",
             self.kept_in_words(),
             if self.touches() { "; the robot touched something" } else { "" },

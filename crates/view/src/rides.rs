@@ -322,6 +322,7 @@ mod tests {
         assert!(page.contains("no; the robot never moved (silent)"), "{page}");
         let summary = rides[1].facts.summary();
         assert!(summary.contains("the robot never moved (silent)"), "{summary}");
+        assert!(summary.contains("least room from the edge of the robot to people"), "{summary}");
     }
 
     #[test]

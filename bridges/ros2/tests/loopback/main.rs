@@ -6,6 +6,7 @@
 
 mod faults;
 mod forecast;
+mod lacking;
 mod lidar;
 mod lifecycle;
 mod nav2;

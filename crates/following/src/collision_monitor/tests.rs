@@ -117,10 +117,31 @@ fn the_same_depth_image_again_is_frozen_and_a_noisy_one_is_not() {
     assert_eq!(reasons[3], None);
     assert!(reasons[4..].iter().all(|reason| *reason == Some(Reason::Frozen)), "{reasons:?}");
     assert_eq!(monitor.frozen_sensor(), Some(("the depth image".into(), false)));
+    assert!(monitor.shows_past());
     let frame = frame(29, EgoMotion::at_rest(0.1), Some(depth_at(29, 0.0, 0.0)), None);
     monitor.update(&frame, &frame.motion, &[], None);
     assert_eq!(monitor.stop_reason(0.5), None, "it goes on");
-    assert_eq!(monitor.frozen_sensor(), None);
+    assert_eq!((monitor.frozen_sensor(), monitor.shows_past()), (None, false));
+}
+
+/// The stop of a camera that contradicted the odometry lasts, and its images do not show the past for ever.
+#[test]
+fn images_that_are_new_again_show_the_present_while_the_stop_lasts() {
+    let mut monitor = settled();
+    let same = depth_at(20, 0.0, 0.0);
+    let moving = EgoMotion { forward: 0.1, ..EgoMotion::at_rest(0.1) };
+    for index in 20..30 {
+        let frame = frame(index, moving, Some(same.clone()), None);
+        monitor.update(&frame, &frame.motion, &[], None);
+    }
+    let frozen = Some(("the depth image".to_owned(), true));
+    assert_eq!((monitor.frozen_sensor(), monitor.shows_past()), (frozen.clone(), true));
+    for index in 30..33 {
+        let depth = depth_at(index, 1.0, 0.0);
+        let frame = frame(index, EgoMotion::at_rest(0.1), Some(depth), None);
+        monitor.update(&frame, &frame.motion, &[], None);
+        assert_eq!((monitor.frozen_sensor(), monitor.shows_past()), (frozen.clone(), false));
+    }
 }
 
 #[test]

@@ -360,6 +360,21 @@ fn commands_expire() {
 }
 
 #[test]
+fn a_withdrawn_command_is_a_stop_from_which_the_robot_starts_anew() {
+    let (mut limiter, command) = at_speed(0.8, 0.8);
+    let soon = command.stamp.plus_seconds(0.1);
+    limiter.withdraw(soon);
+    for at in [command.stamp, soon] {
+        let order = limiter.orders().at(at);
+        assert_eq!((order.wheels, order.reason), (WheelSpeeds::STOP, Reason::Expired));
+    }
+    let next = Wish { stamp: command.stamp.plus_seconds(0.2), ..wish(0, 0.8, 0.8) };
+    let started = limiter.limit(&next, free);
+    assert!((0.01..0.11).contains(&started.wheels.left), "{started:?}");
+    assert_eq!(limiter.orders().at(started.stamp), started);
+}
+
+#[test]
 fn a_jump_of_odometry_lasts_until_armed() {
     let (mut limiter, command) = at_speed(0.5, 0.5);
     limiter.check_motion(&moved(EgoMotion { forward: 2.0, ..EgoMotion::at_rest(0.1) }));

@@ -94,6 +94,9 @@ pub struct FrameData {
     pub n: u64,
     /// Pose of the robot in the odometry frame: x, y, heading.
     pub robot: [f64; 3],
+    /// True if the image is frozen: boxes and positions are those of an earlier time.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub stale: bool,
     /// Tracks, nearest first.
     pub tracks: Vec<TrackData>,
     /// Candidates.

@@ -52,6 +52,7 @@ pub fn frame_data(moment: &Moment) -> FrameData {
     FrameData {
         n: notes.frame,
         robot: notes.robot_odom,
+        stale: notes.drive.as_ref().is_some_and(|drive| drive.shows_past),
         tracks: moment.tracks.iter().map(|track| track_data(track, notes.robot_odom[2])).collect(),
         found: notes.candidates.iter().map(candidate_data).collect(),
         dropped: dropped_data(notes),
@@ -244,6 +245,16 @@ mod tests_of_data {
         let data = track_data(&track, std::f64::consts::FRAC_PI_2);
         assert_eq!((data.v, data.d, data.state), ([0.0, 1.0], 5.0, "predicted"));
         assert!(data.guess);
+    }
+
+    #[test]
+    fn a_frame_of_a_frozen_camera_is_stale() {
+        let mut moment = Moment::default();
+        for (shows_past, text) in [(true, Some(true)), (false, None)] {
+            moment.notes.drive = Some(DriveNote { shows_past, ..DriveNote::default() });
+            let data = serde_json::to_value(frame_data(&moment)).unwrap();
+            assert_eq!(data.get("stale").map(|stale| stale == true), text);
+        }
     }
 
     #[test]

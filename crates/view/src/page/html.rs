@@ -164,7 +164,7 @@ fn image_marks() -> Markup {
         (mark("box-seen", "seen"))
         (mark("box-guess", "predicted"))
         (mark("box-tentative", "not confirmed yet"))
-        span { "~ guessed distance" }
+        span { "distance from the robot's middle, ~ guessed" }
         span data-layer="target" { (mark("sign", "target")) }
         span data-layer="truth" { (mark("box-truth", "annotated")) }
         span data-layer="truth" { (mark("box-miss", "missed")) }
@@ -361,6 +361,15 @@ mod tests {
             assert!(page.contains(&format!(".c{id} {{ --c: {colour}; }}")), "{id}");
             // Plans of a report have the same.
             assert!(BASE_STYLE.contains(&format!("--t{id}: {colour};")), "{id}");
+        }
+    }
+
+    /// Causes of stops have the distance from the edge of the robot.
+    #[test]
+    fn distances_of_people_name_the_middle_of_the_robot() {
+        assert!(hostile_page().contains("distance from the robot's middle, ~ guessed"));
+        for words in ["from the middle of the robot", "\"From the robot's middle\", \"Speed\""] {
+            assert!(SCRIPT.contains(words), "{words}");
         }
     }
 
