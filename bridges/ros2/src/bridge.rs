@@ -444,7 +444,7 @@ impl Bridge {
         }
         if self.lacking == 1 {
             tell(&format!(
-                "warning: {error}: the robot stands for each such frame; they are counted"
+                "warning: {error}: the robot stops for each such frame; they are counted"
             ));
         }
     }
