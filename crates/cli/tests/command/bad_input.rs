@@ -100,7 +100,7 @@ const OTHERS: [(&str, i32, &[&str]); 54] = [
     ("run good.mpac", 2, &["did you mean the log", "good.mcap"]),
     ("run nearest.toml logs", 1, &["directory", "inside.mcap"]),
     ("run nearest.toml old.bag", 1, &["rosbag fix"]),
-    ("inspect bag.db3", 1, &["bag.db3", "rosbag2 database"]),
+    ("inspect bag.db3", 1, &["bag.db3", "the database is damaged or cut off"]),
     ("run nearest.toml good.mcap -o old.bag", 2, &["not a directory"]),
     ("run nearest.toml good.mcap -o good.mcap --overwrite", 2, &["good.mcap"]),
     (

@@ -234,7 +234,7 @@ fn from_depth_in_doubt_nothing_is_concluded() {
     let other_clock = with_depth_stamp(|_, at| at + 600_000_000_000);
     let mono = root().join("configs/mono.toml");
     for (changes, config, ids, why) in [
-        (scaled(100.0), config(), &["missed"][..], "the unit of depth is in doubt"),
+        (scaled(10.0), config(), &["missed"][..], "the unit of depth is in doubt"),
         (scaled(0.0), config(), &["registration"], "depth has no reading"),
         (other_clock, mono, &["registration"], "the depth is not used"),
     ] {

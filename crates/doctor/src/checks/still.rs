@@ -30,10 +30,7 @@ pub fn still(evidence: &Evidence) -> Option<Finding> {
         severity = severity.min(Severity::Warn);
     }
     let mut measured = match coverage.still {
-        0 => {
-            let tracks = counted(tracks, "track");
-            format!("each of {tracks} moved, or lasted less than {STILL_S:.0} s")
-        }
+        0 => without_still(tracks),
         still => format!(
             "{still} of {} never moved; they fill {:.0} % of the boxes",
             counted(tracks, "track"),
@@ -51,6 +48,12 @@ pub fn still(evidence: &Evidence) -> Option<Finding> {
         .figure("idle_boxes_share", idle_share)
         .why("people move at some time: these are objects, or people who sit or stand throughout");
     Some(finding.remedy(remedy(evidence)))
+}
+
+/// Returns the words for tracks of which none was still.
+fn without_still(tracks: usize) -> String {
+    let all = if tracks == 1 { "the track".to_owned() } else { format!("each of {tracks} tracks") };
+    format!("{all} moved, or lasted less than {STILL_S:.0} s")
 }
 
 /// Returns the change that helped most on this log, or else general advice.
@@ -83,3 +86,14 @@ fn other_config(evidence: &Evidence) -> String {
 
 /// Config whose verifiers drop objects.
 const VERIFIED: &str = "depth-verified";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_track_is_not_each_of_one() {
+        assert!(without_still(1).starts_with("the track moved, or"));
+        assert!(without_still(3).starts_with("each of 3 tracks moved, or"));
+    }
+}
