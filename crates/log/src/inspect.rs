@@ -181,9 +181,9 @@ impl Inspection {
         }
         self.usable.extend(facts.sensor_topics.keys());
         let [colour, depth] = [&facts.colour_topic, &facts.depth_topic]
-            .map(|topic| scan.topics.get(topic.as_ref()?).map(|topic| &topic.stamps[..]));
+            .map(|topic| scan.topics.get(topic.as_ref()?));
         let both = colour.zip(depth);
-        self.skew = both.and_then(|(colour, depth)| Skew::between(colour, depth, tolerance_s));
+        self.skew = both.and_then(|(colour, depth)| depth.skew_from(colour, tolerance_s));
     }
 
     /// Returns the topic of that name.
@@ -263,7 +263,10 @@ impl Inspection {
             writeln!(f, "  stereo baseline {baseline:.4} m")?;
         }
         if let Some(skew) = self.skew {
-            writeln!(f, "  depth {:+.1} ms after colour", 1e3 * skew.median_s)?;
+            match skew.other_clock() {
+                Some(words) => writeln!(f, "  depth: {words}")?,
+                None => writeln!(f, "  depth {:+.1} ms after colour", 1e3 * skew.median_s)?,
+            }
         }
         self.write_usable(f)
     }
