@@ -122,7 +122,7 @@ const checkNewPerson = async (page, index) => {
   assert.deepEqual(rows.map((row) => row.key), [1, 0, 0, 0, 0, 0, 0, 0, 1]);
   isNear(rows[4].ub_x, (rows[0].ub_x + rows[8].ub_x) / 2, 1.5, "the middle is half way");
   const withDepth = rows.filter((row) => row.head_z > 0).length;
-  assert.ok(withDepth > 0, "depth fills in the place");
+  assert.ok(withDepth > 0, "depth gives the place");
   await goTo(page, index + 4);
   await press(page, "Delete");
   assert.equal(rowsOf(9).length, 8, "deleted in one frame");
@@ -173,7 +173,7 @@ const checkKill = async (page, child) => {
   assert.equal(readFileSync(file, "utf8"), before, "the kill leaves the file whole");
   await page.click("#undo");
   await page.waitForSelector("#problem:not([hidden])");
-  assert.ok((await page.textContent("#problem")).includes("does not run any more"));
+  assert.ok((await page.textContent("#problem")).includes("has ended"));
 };
 
 const checkContinued = async (page, url, before) => {

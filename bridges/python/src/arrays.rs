@@ -1,4 +1,4 @@
-//! numpy arrays in and out: images, poses and points.
+//! Conversion of numpy arrays: images, poses and points.
 
 use std::sync::Arc;
 
@@ -16,12 +16,12 @@ use tagalong::geometry::Rect;
 
 use crate::errors::wrong;
 
-/// Largest side of an image, pixels, as in logs.
+/// Maximum side of an image, pixels, as in logs.
 const MAX_SIDE: usize = 16_384;
-/// Largest error of a rotation matrix: entries of `R R' - I`.
+/// Maximum error of a rotation matrix: elements of `R R' - I`.
 const ROTATION_TOLERANCE: f64 = 1e-3;
 
-/// Puts a colour image of rows x columns x 3, or a grey one of rows x columns, into the images of a
+/// Adds a colour image of rows x columns x 3, or a grey one of rows x columns, to the images of a
 /// frame.
 ///
 /// # Errors
@@ -48,13 +48,13 @@ fn rgb(array: &Bound<'_, PyAny>) -> PyResult<RgbImage> {
     let view = pixels.as_array();
     let packed = match view.as_slice() {
         Some(bytes) => bytes.as_chunks().0.to_vec(),
-        // A crop or a flipped image is gathered row by row.
+        // A cropped or flipped image is copied row by row.
         None => view.rows().into_iter().map(|p| [p[0], p[1], p[2]]).collect(),
     };
     RgbImage::from_pixels(width, height, packed).ok_or_else(|| wrong("colour has a wrong size"))
 }
 
-/// Returns an image of intensities.
+/// Returns a grey image.
 pub fn grey(array: &Bound<'_, PyAny>, name: &str) -> PyResult<GreyImage> {
     let pixels: PyReadonlyArray2<'_, u8> =
         array.extract().map_err(|_| odd(array, name, "uint8"))?;
@@ -64,8 +64,8 @@ pub fn grey(array: &Bound<'_, PyAny>, name: &str) -> PyResult<GreyImage> {
         .ok_or_else(|| wrong(format!("{name} has a wrong size")))
 }
 
-/// Returns a depth image: float32 or float64 in metres, or uint16 in millimetres. What is not finite,
-/// not above 0, or 65535 is no reading.
+/// Returns a depth image: float32 or float64 in metres, or uint16 in millimetres. Values that are
+/// not finite or not above 0, and 65535, mean that there is no reading.
 pub fn depth(array: &Bound<'_, PyAny>) -> PyResult<DepthImage> {
     let shape = shape_of(array, "depth")?;
     if shape.len() != 2 {
@@ -79,7 +79,7 @@ pub fn depth(array: &Bound<'_, PyAny>) -> PyResult<DepthImage> {
         let view = pixels.as_array();
         match view.as_slice() {
             Some(packed) => DepthImage::from_millimetres(width, height, packed),
-            // A crop or a flipped image is gathered row by row.
+            // A cropped or flipped image is copied row by row.
             None => {
                 let packed: Vec<u16> = view.iter().copied().collect();
                 DepthImage::from_millimetres(width, height, &packed)
@@ -94,7 +94,7 @@ pub fn depth(array: &Bound<'_, PyAny>) -> PyResult<DepthImage> {
     image.ok_or_else(|| wrong("depth has a wrong size"))
 }
 
-/// Returns a depth in metres; NaN where it is no reading.
+/// Returns a depth in metres; NaN if it is not a reading.
 fn of_metres(value: f32) -> f32 {
     if DepthImage::is_reading(value) { value } else { f32::NAN }
 }
@@ -118,7 +118,7 @@ fn sides(shape: &[usize], name: &str) -> PyResult<(usize, usize)> {
     Ok((height, width))
 }
 
-/// Returns the exception of an array of another type.
+/// Returns the exception for an array of another type.
 fn odd(array: &Bound<'_, PyAny>, name: &str, wanted: &str) -> PyErr {
     let kind = match array.cast::<PyUntypedArray>() {
         Ok(array) => array.dtype().typeobj().to_string(),
@@ -158,7 +158,7 @@ pub fn detections(given: &Bound<'_, PyAny>) -> PyResult<Vec<ExternalDetection>> 
     rows.iter().map(|row| detection(row)).collect()
 }
 
-/// Words about detections of another shape.
+/// Message about detections of another shape.
 const ROWS: &str = "detections are rows of x, y, width, height, score (a box in the image, pixels), or of \
                     x, y, z, score (the centre of the head in the robot frame, m)";
 
@@ -192,10 +192,10 @@ pub fn pose(given: &Bound<'_, PyAny>) -> PyResult<Isometry2<f64>> {
     Ok(planar_pose(&isometry(given, "pose")?))
 }
 
-/// Returns a pose in space from a 4 x 4 matrix.
+/// Returns a 3D pose from a 4 x 4 matrix.
 ///
 /// # Errors
-/// `ValueError` for another shape, and for a matrix that is no rigid motion.
+/// `ValueError` for another shape, and for a matrix that is not a rigid motion.
 pub fn isometry(given: &Bound<'_, PyAny>, name: &str) -> PyResult<Isometry3<f64>> {
     let rows: [[f64; 4]; 4] = given.extract().map_err(|_| {
         wrong(format!("{name} is neither a 4 x 4 matrix nor, of the robot, (x, y, heading)"))

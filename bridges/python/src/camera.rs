@@ -78,7 +78,7 @@ impl PyCamera {
         self.0.height
     }
 
-    /// Focal length along columns, pixels; of a panorama pixels per radian.
+    /// Focal length along columns, pixels; for a panorama pixels per radian.
     #[getter]
     fn focal_px(&self) -> f64 {
         self.0.focal_px()
@@ -107,7 +107,7 @@ fn check(width: usize, height: usize, lens: &Pinhole) -> PyResult<()> {
     if width == 0 || height == 0 {
         return Err(wrong(format!("the image has {width} x {height} pixels")));
     }
-    // Far beyond any lens; a larger number is one in other units.
+    // Far beyond any lens; a larger number must be in other units.
     let longest = 1e3 * width.max(height) as f64;
     for (name, focal) in [("fx", lens.fx), ("fy", lens.fy)] {
         if !(focal > 0.0 && focal <= longest) {

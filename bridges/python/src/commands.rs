@@ -17,9 +17,9 @@ use tagalong_cli::{
 
 use crate::errors::{failed, raised, wrong};
 
-/// Time between two looks for Ctrl-C.
+/// Time between two checks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(10);
-/// Longest wait for a run to finish its files after Ctrl-C.
+/// Maximum time to wait for a run to finish its files after Ctrl-C.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 /// Runs the program with these arguments, without its name, and returns its exit code: 0 also for
@@ -49,7 +49,7 @@ pub fn run(
     seed: Option<u64>,
     camera: Option<String>,
 ) -> PyResult<bool> {
-    // A path alone is that of a log or of a config, as on the command line.
+    // A single path is that of a log or of a config, as on the command line.
     let (config, log) = match config {
         Some(config) => (config, Some(log)),
         None => (log, None),
@@ -75,7 +75,7 @@ pub fn run(
     }
 }
 
-/// Runs in a thread, and looks for Ctrl-C meanwhile.
+/// Runs in a thread, and checks for Ctrl-C meanwhile.
 fn interruptible(py: Python<'_>, args: RunArgs) -> PyResult<Outcome> {
     let signals = Signals::default();
     let asked = signals.clone();
@@ -85,7 +85,7 @@ fn interruptible(py: Python<'_>, args: RunArgs) -> PyResult<Outcome> {
         py.detach(|| thread::sleep(LOOK));
         if let Err(interrupt) = py.check_signals() {
             signals.interrupt();
-            // A run that still looks through its log has written nothing, and will not.
+            // A run that is still in its first pass over the log has written nothing, and will not.
             let since = Instant::now();
             while !running.is_finished() && since.elapsed() < PATIENCE {
                 py.detach(|| thread::sleep(LOOK));
@@ -134,7 +134,7 @@ pub fn scores(
     py.detach(|| eval_json(&args)).map_err(in_python)
 }
 
-/// Options of the program in its messages, and the arguments of the functions here.
+/// Options of the program in its messages, with the corresponding arguments of the functions here.
 const ARGUMENTS: [(&str, &str); 13] = [
     ("--overwrite", "overwrite=True"),
     ("--strict", "strict=True"),
@@ -151,7 +151,7 @@ const ARGUMENTS: [(&str, &str); 13] = [
     ("--drop-doubled-ids", "drop_doubled_ids=True"),
 ];
 
-/// Returns the exception of a failed command, with the words of Python.
+/// Returns the exception for a failed command, with the names of Python arguments in its message.
 fn in_python(mut failure: Failure) -> PyErr {
     for (option, argument) in ARGUMENTS {
         failure.message = failure.message.replace(option, argument);

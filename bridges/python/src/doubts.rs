@@ -1,15 +1,16 @@
-//! Arguments that can be used, and are probably not what the caller means.
+//! Warnings about arguments that are valid but probably not what the caller intended.
 
 use tagalong::core::{DepthImage, Images, Stamp};
 
 /// Median of a depth image, m, beyond which it is probably in other units.
 const FAR_M: f32 = 50.0;
-/// Number of pixels, about, by which the median is judged.
+/// Approximate number of pixels from which the median is computed.
 const SAMPLE: usize = 4096;
-/// Time between frames, ns, below which stamps are probably in other units: no camera is so fast.
+/// Time between frames, ns, below which stamps are probably in other units, because no camera is
+/// that fast.
 const FAST_NS: u64 = 50_000;
 
-/// Doubts that were told: each once.
+/// Warnings that were already given; each is given once.
 #[derive(Default)]
 pub struct Doubts {
     of_units: bool,
@@ -21,7 +22,7 @@ pub struct Doubts {
 }
 
 impl Doubts {
-    /// Returns the doubts about a frame that were not told before. `stamp` is one of whole
+    /// Returns the warnings about a frame that were not given before. `stamp` is one in integer
     /// nanoseconds.
     pub fn of(&mut self, images: &Images, stamp: Option<Stamp>) -> Vec<String> {
         let mut said = Vec::new();
@@ -83,7 +84,8 @@ impl Doubts {
     }
 }
 
-/// Returns the median of the readings of an image, m, by some of its pixels; `None` without any.
+/// Returns the median of the readings of an image, m, from some of its pixels; `None` without
+/// readings.
 fn median_m(depth: &DepthImage) -> Option<f32> {
     let pixels = depth.pixels();
     let every = (pixels.len() / SAMPLE).max(1);

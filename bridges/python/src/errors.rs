@@ -20,10 +20,10 @@ create_exception!(
     "A config, or an argument, that cannot be used; shown with its line and the remedy."
 );
 
-/// Exit code of wrong usage and wrong configs.
+/// Exit code for wrong usage and invalid configs.
 const USAGE: u8 = 2;
 
-/// Returns the exception of a failed command.
+/// Returns the exception for a failed command.
 pub fn raised(failure: impl Into<Failure>) -> PyErr {
     let failure = failure.into();
     match failure.code {
@@ -32,12 +32,12 @@ pub fn raised(failure: impl Into<Failure>) -> PyErr {
     }
 }
 
-/// Returns the exception of work that failed.
+/// Returns the exception for work that failed.
 pub fn failed(why: impl Display) -> PyErr {
     TagalongError::new_err(why.to_string())
 }
 
-/// Returns the exception of an argument with a wrong value.
+/// Returns the exception for an argument with an invalid value.
 pub fn wrong(why: impl Display) -> PyErr {
     PyValueError::new_err(why.to_string())
 }

@@ -20,7 +20,7 @@ pub struct PyFrame(pub Arc<LogFrame>);
 
 #[pymethods]
 impl PyFrame {
-    /// Number of the image in the log, from 1.
+    /// Index of the image in the log, from 1.
     #[getter]
     fn index(&self) -> u64 {
         self.0.frame.index
@@ -32,7 +32,7 @@ impl PyFrame {
         self.0.frame.stamp.nanos()
     }
 
-    /// Colour image, rows x columns x 3, or grey, rows x columns, uint8; None without.
+    /// Colour image, rows x columns x 3, or grey image, rows x columns, uint8; None without one.
     #[getter]
     fn colour<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let images = self.0.frame.images();
@@ -43,14 +43,15 @@ impl PyFrame {
         })
     }
 
-    /// Depth along the optical axis, m, rows x columns, float32; NaN is no reading. None without.
+    /// Depth along the optical axis, m, rows x columns, float32; NaN where there is no reading.
+    /// None without a depth image.
     #[getter]
     fn depth<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f32>>>> {
         let depth: Option<Arc<DepthImage>> = self.0.frame.images().depth;
         depth.map(|image| arrays::of_plane(py, &image)).transpose()
     }
 
-    /// Points of the laser scan, rows of x, y, z, m, robot frame; None without.
+    /// Points of the laser scan, rows of x, y, z, m, robot frame; None without a scan.
     #[getter]
     fn scan<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
         let points = &self.0.frame.laser()?.points;
@@ -60,7 +61,7 @@ impl PyFrame {
         Some(PyArray2::from_owned_array(py, array))
     }
 
-    /// The camera; None in a frame of a laser scan alone.
+    /// The camera; None for a frame that has only a laser scan.
     #[getter]
     fn camera(&self) -> Option<PyCamera> {
         let camera = &self.0.frame.camera;
@@ -109,10 +110,10 @@ impl PyFrames {
     /// # Errors
     /// As `Log::frames_for`.
     pub fn open(log: &Path, pipeline: &Pipeline) -> tagalong::Result<Self> {
-        // Colour is for the caller to look at, whether or not the pipeline uses it.
+        // Colour is added for the caller, even if the pipeline does not use it.
         let inputs = pipeline.inputs().accept(Input::Colour);
         let frames = Log::open(log)?.frames_for(pipeline, inputs)?;
-        // The counters tell of a loss, as in the program.
+        // The counters show a loss, as in the program.
         Ok(Self(Mutex::new(frames.accept_loss())))
     }
 
@@ -133,7 +134,7 @@ impl PyFrames {
         Ok(next.transpose().map_err(raised)?.map(|frame| PyFrame(Arc::new(frame))))
     }
 
-    /// Counters so far: messages read, images skipped with their reasons, damage.
+    /// Counters so far: messages that were read, images that were skipped by reason, and damage.
     #[getter]
     fn counters(&self) -> BTreeMap<&'static str, u64> {
         self.with(|source| source.counters().clone())

@@ -1,8 +1,8 @@
 //! The program and the pipelines of Tagalong as the Python module `tagalong._tagalong`.
 //!
-//! `python/tagalong/__init__.py` is the public module, `_tagalong.pyi` beside it has the types. Images
-//! are checked and copied once, into the layout of a frame; the interpreter is free while a
-//! pipeline, a log or a run works.
+//! `python/tagalong/__init__.py` is the public module, and `_tagalong.pyi` beside it has the types.
+//! Images are checked and copied once, into the memory layout of a frame; the GIL is released while
+//! a pipeline, a log or a run works.
 
 mod arrays;
 mod camera;

@@ -20,20 +20,20 @@ use crate::errors::{ConfigError, failed, raised, wrong};
 use crate::frames::{PyFrame, PyFrames};
 use crate::report::{PyCommand, PyReport, stamp};
 
-/// A pipeline: detectors, verifiers, association, filter, and a controller where the config has one.
+/// A pipeline: detectors, verifiers, association, filter, and a controller if the config has one.
 #[pyclass(name = "Pipeline", module = "tagalong", frozen)]
 pub struct PyPipeline {
     work: Mutex<Work>,
     doubts: Mutex<Doubts>,
 }
 
-/// Pipeline with the maker of its frames.
+/// Pipeline together with the maker of its frames.
 struct Work {
     pipeline: Pipeline,
     maker: FrameMaker,
-    /// True before the first frame of arrays, at which the sources of a controller are checked.
+    /// True before the first frame from arrays, when the sources of a controller are checked.
     is_new: bool,
-    /// True once a frame of arrays had detections.
+    /// True once a frame from arrays had detections.
     is_told: bool,
 }
 
@@ -54,10 +54,10 @@ impl PyPipeline {
     /// Builds a pipeline.
     ///
     /// source: the path of a TOML file, the name of a built-in config ("depth-verified"), or the
-    /// text of a config itself: a str with a line break or a `=`. folder: base of relative paths in
-    /// a text. seed: instead of the config's.
+    /// text of a config: a str that contains a line break or a `=`. folder: base folder of relative
+    /// paths in such a text. seed: replaces the seed of the config.
     ///
-    /// Raises ConfigError with line and remedy.
+    /// Raises ConfigError, with the line and the remedy.
     #[staticmethod]
     #[pyo3(signature = (source, *, folder=None, seed=None))]
     fn from_toml(
@@ -70,24 +70,24 @@ impl PyPipeline {
         py.detach(|| Self::build(&source, seed)).map_err(raised)
     }
 
-    /// Takes one frame through the pipeline and returns a Report.
+    /// Runs the pipeline on one frame and returns a Report.
     ///
-    /// Raises ValueError for a frame that cannot be used, such as one without depth for a pipeline that
-    /// needs it: the frame leads to no command, and the next one is taken as usual.
+    /// Raises ValueError for a frame that cannot be used, such as one without depth for a pipeline
+    /// that needs it: no command follows from this frame, and the next one is processed as usual.
     ///
     /// colour: uint8, rows x columns x 3 (red, green, blue) or rows x columns. depth: float32 in
-    /// metres or uint16 in millimetres, registered to colour. camera: a Camera, of the size of the
-    /// images. pose: of the robot in the odometry frame, (x, y, heading) or 4 x 4; None without
-    /// odometry. stamp: capture time, ns as an int or seconds as a float. scan: float64, rows of
-    /// x, y or x, y, z of a laser scan in the robot frame. scan_stamp: time of the scan, as stamp,
-    /// where the scanner is slower than the images and its last scan is given again [default:
-    /// stamp]. right, baseline_m: the right image of a rectified stereo pair. index: number of the
-    /// frame [default: frames so far]. odometry_age_s: age of the reading of odometry from which the
-    /// pose is, at the time of the stamp; a robot is not steered by an old one [default: 0, and
-    /// infinite without a pose]. detections: those of a detector of your own, for a config with the
-    /// plugin `recorded-detections` ("recorded"): rows of x, y, width, height, score, pixels of the
-    /// camera's image, or of x, y, z, score, the centre of the head in the robot frame, m; [] where
-    /// it found no person, None where it did not run.
+    /// metres or uint16 in millimetres, registered to colour. camera: a Camera with the size of the
+    /// images. pose: pose of the robot in the odometry frame, (x, y, heading) or 4 x 4; None
+    /// without odometry. stamp: capture time, ns as an int or seconds as a float. scan: float64,
+    /// rows of x, y or x, y, z of a laser scan in the robot frame. scan_stamp: time of the scan,
+    /// given like stamp, if the scanner is slower than the images and its last scan is passed again
+    /// [default: stamp]. right, baseline_m: the right image of a rectified stereo pair, and its
+    /// baseline, m. index: index of the frame [default: number of frames so far]. odometry_age_s:
+    /// age of the odometry that the pose comes from, at the time of the stamp; a robot is not
+    /// steered by old odometry [default: 0, and infinite without a pose]. detections: the output of
+    /// your own detector, for a config with the plugin `recorded-detections` ("recorded"): rows of
+    /// x, y, width, height, score, in pixels of the camera's image, or of x, y, z, score, with the
+    /// centre of the head in the robot frame, m; [] if it found no person, None if it did not run.
     #[pyo3(signature = (colour, depth, camera, pose, stamp, *, scan=None, scan_stamp=None, right=None,
         baseline_m=None, index=None, odometry_age_s=None, detections=None))]
     #[allow(clippy::too_many_arguments, reason = "they are the keywords of a Python method")]
@@ -127,7 +127,7 @@ impl PyPipeline {
         PyReport::new(py, report, &camera)
     }
 
-    /// Takes a frame of `frames` through the pipeline, as the program does.
+    /// Runs the pipeline on a frame of `frames`, as the program does.
     fn step_frame(&self, py: Python<'_>, frame: &PyFrame) -> PyResult<PyReport> {
         let frame = &frame.0;
         let report = py.detach(|| {
@@ -143,15 +143,15 @@ impl PyPipeline {
         py.detach(|| PyFrames::open(&log, &self.work()?.pipeline).map_err(raised))
     }
 
-    /// The command in force at a time (as `stamp` of `step`): the last one until it expires, zero
-    /// after that; None without a controller.
+    /// The command in force at a time (given like `stamp` of `step`): the last one until it
+    /// expires, then zero; None without a controller.
     fn command_at(&self, stamp: &Bound<'_, PyAny>) -> PyResult<Option<PyCommand>> {
         let now = self::stamp(stamp)?;
         Ok(self.work()?.pipeline.command_at(now).map(PyCommand))
     }
 
-    /// Follows the person of this track; `ValueError` without a controller, or without such a track in
-    /// the last frame.
+    /// Follows the person of this track. Raises ValueError without a controller, or if the last
+    /// frame has no such track.
     fn choose_target(&self, track: u32) -> PyResult<()> {
         let person = Enrollment::of(Choice::Track(TrackId(track)));
         self.work()?.pipeline.enroll(&person).map_err(wrong)
@@ -163,8 +163,8 @@ impl PyPipeline {
         Ok(())
     }
 
-    /// Tells whether the base executes the commands from now on. Only then are they compared with the
-    /// odometry: a base that does something else, or responds too late, is a fault.
+    /// Sets whether the base executes the commands from now on. Only then are they compared with
+    /// the odometry: a base that does something else, or responds too late, is a fault.
     fn set_driving(&self, is_driving: bool) -> PyResult<()> {
         self.work()?.pipeline.set_driving(is_driving);
         Ok(())
@@ -176,7 +176,7 @@ impl PyPipeline {
         Ok(())
     }
 
-    /// The fault that holds the robot until `arm`; None without one.
+    /// The fault that stops the robot until `arm`; None without one.
     #[getter]
     fn fault(&self) -> PyResult<Option<&'static str>> {
         Ok(self.work()?.pipeline.fault())
@@ -196,7 +196,8 @@ impl PyPipeline {
 }
 
 impl PyPipeline {
-    /// Builds a pipeline. A mistake in a table for logs is one of the config, so it is told here.
+    /// Builds a pipeline. A mistake in a table for logs is an error of the config, so it is
+    /// reported here.
     fn build(source: &ConfigSource, seed: Option<u64>) -> tagalong::Result<Self> {
         let registry = tagalong::builtin_registry();
         let builder = Pipeline::builder(&registry);
@@ -211,7 +212,7 @@ impl PyPipeline {
         Ok(Self { work: Mutex::new(work), doubts: Mutex::default() })
     }
 
-    /// Warns of arrays and stamps that are probably not meant so, once of each kind.
+    /// Warns of arrays and stamps that are probably not intended, once for each kind.
     fn doubt(&self, py: Python<'_>, images: &Images, stamp: Option<Stamp>) -> PyResult<()> {
         let said = self.doubts.lock().unwrap_or_else(PoisonError::into_inner).of(images, stamp);
         said.iter().try_for_each(|words| warn(py, words))
@@ -265,7 +266,8 @@ impl Work {
     }
 }
 
-/// Returns the exception of a frame that failed: one that is refused alone is a wrong argument.
+/// Returns the exception for a frame that failed: a frame that is rejected alone is an invalid
+/// argument.
 fn told(error: StepError) -> PyErr {
     match error {
         StepError::Lacks { .. } => wrong(error),
@@ -279,11 +281,11 @@ fn warn(py: Python<'_>, words: &str) -> PyResult<()> {
     PyErr::warn(py, &py.get_type::<PyUserWarning>(), &words, 1)
 }
 
-/// Returns the config that a path, a name or a text stands for.
+/// Returns the config for a path, a name or a text.
 fn config(source: &Bound<'_, PyAny>, folder: Option<&Path>) -> PyResult<ConfigSource> {
     if let Ok(text) = source.cast::<PyString>() {
         let text = text.to_string();
-        // No name of a config has either.
+        // The name of a config contains neither.
         if text.contains(['\n', '=']) {
             let source = ConfigSource::from_text(text, folder.unwrap_or(Path::new("")));
             return Ok(source.with_name("<text>"));

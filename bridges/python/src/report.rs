@@ -29,7 +29,7 @@ impl PyTrack {
 
 #[pymethods]
 impl PyTrack {
-    /// Number of the track, never used twice.
+    /// ID of the track, never used twice.
     #[getter]
     fn id(&self) -> u32 {
         self.track.id.0
@@ -74,8 +74,8 @@ impl PyTrack {
         )
     }
 
-    /// Direction in which the body is turned, rad from the x axis of the robot's frame to the left; None
-    /// where joints do not show it.
+    /// Direction in which the body is turned, rad from the x axis of the robot frame to the left;
+    /// None if the joints do not show it.
     #[getter]
     fn body_direction(&self) -> Option<f64> {
         let at = self.track.estimate.person.position;
@@ -88,14 +88,14 @@ impl PyTrack {
         Some(self.joints.as_ref()?.has_raised_hand())
     }
 
-    /// Probability that this is a person, smoothed over the track; its log-odds are `score` in Rust.
+    /// Probability that this is a person, smoothed over the track; `score` in Rust is its log-odds.
     #[getter]
     fn score(&self) -> f64 {
         1.0 / (1.0 + (-self.track.score).exp())
     }
 
-    /// True if evidence of this frame supports the track; otherwise it is predicted, ever less
-    /// surely, also outside of the view.
+    /// True if the track has evidence in this frame; otherwise it is predicted, with growing
+    /// uncertainty, even outside of the view.
     #[getter]
     fn seen(&self) -> bool {
         self.track.seen
@@ -113,13 +113,13 @@ impl PyTrack {
         self.track.occluded
     }
 
-    /// Frames since the track started.
+    /// Number of frames since the track started.
     #[getter]
     fn age(&self) -> u32 {
         self.track.age
     }
 
-    /// Seconds since evidence last supported the track.
+    /// Time since the track last had evidence, s.
     #[getter]
     fn unseen_s(&self) -> f64 {
         self.track.unseen_s
@@ -138,7 +138,7 @@ pub struct PyCommand(pub Command);
 
 #[pymethods]
 impl PyCommand {
-    /// Speed forward, m/s.
+    /// Forward speed, m/s.
     #[getter]
     fn linear_mps(&self) -> f64 {
         self.0.twist.linear_mps
@@ -162,13 +162,13 @@ impl PyCommand {
         (self.0.wheels.left, self.0.wheels.right)
     }
 
-    /// Capture time of the frame that it responds to, ns.
+    /// Capture time of the frame to which it responds, ns.
     #[getter]
     fn stamp_ns(&self) -> u64 {
         self.0.stamp.nanos()
     }
 
-    /// Time at which the wheels stop unless a newer command has come, ns.
+    /// Time at which the wheels stop unless a newer command has arrived, ns.
     #[getter]
     fn valid_until_ns(&self) -> u64 {
         self.0.valid_until.nanos()
@@ -197,7 +197,7 @@ impl PyReport {
     /// Returns the report with its tracks as objects.
     ///
     /// # Errors
-    /// An interpreter without memory.
+    /// If the interpreter has no memory.
     pub fn new(py: Python<'_>, report: FrameReport, camera: &Camera) -> PyResult<Self> {
         let joints = report.joints();
         let each = report.tracks.iter();
@@ -213,7 +213,7 @@ impl PyReport {
 
 #[pymethods]
 impl PyReport {
-    /// Number of the frame, from 1.
+    /// Index of the frame, from 1.
     #[getter]
     fn index(&self) -> u64 {
         self.report.index
@@ -225,15 +225,16 @@ impl PyReport {
         self.report.stamp.nanos()
     }
 
-    /// "processed"; or, by its stamp: "duplicate" (that of the frame before) and "out-of-order" (a little
-    /// older), where the frame was left out; "reset-backward" and "reset-forward" (the clock was set back,
-    /// or jumped ahead), where all tracks ended before it was processed.
+    /// "processed", or another outcome because of its stamp: for "duplicate" (the stamp of the
+    /// previous frame) and "out-of-order" (slightly older) the frame was left out; for
+    /// "reset-backward" and "reset-forward" (the clock was set back, or jumped ahead) all tracks
+    /// ended before the frame was processed.
     #[getter]
     fn outcome(&self) -> &'static str {
         outcome(&self.report.outcome).0
     }
 
-    /// The confirmed tracks, near to far; also those that are predicted, see `Track.seen`.
+    /// The confirmed tracks, nearest first, including predicted ones; see `Track.seen`.
     #[getter]
     fn tracks(&self, py: Python<'_>) -> Vec<Py<PyTrack>> {
         self.those(py, true)
@@ -245,7 +246,7 @@ impl PyReport {
         self.those(py, false)
     }
 
-    /// Numbers of the tracks that ended in this frame.
+    /// IDs of the tracks that ended in this frame.
     #[getter]
     fn ended(&self) -> Vec<u32> {
         self.report.ended.iter().map(|id| id.0).collect()
@@ -257,7 +258,7 @@ impl PyReport {
         self.report.command.map(PyCommand)
     }
 
-    /// Track of the person to follow.
+    /// ID of the track of the person to follow.
     #[getter]
     fn target(&self) -> Option<u32> {
         self.report.target.map(|id| id.0)
@@ -270,7 +271,7 @@ impl PyReport {
         entries.map(|entry| (entry.test.to_owned(), entry.count)).collect()
     }
 
-    /// Milliseconds of each stage.
+    /// Time of each stage, ms.
     #[getter]
     fn timings_ms(&self) -> BTreeMap<&'static str, f64> {
         self.report.timings.iter().copied().collect()
@@ -284,7 +285,7 @@ impl PyReport {
     }
 }
 
-/// Returns the name of an outcome and, where the frame was not just processed, words about it.
+/// Returns the name of an outcome and, unless the frame was just processed, a description.
 fn outcome(outcome: &Outcome) -> (&'static str, &'static str) {
     match outcome {
         Outcome::Duplicate => ("duplicate", "left out, its stamp is that of the frame before"),
@@ -301,14 +302,14 @@ fn outcome(outcome: &Outcome) -> (&'static str, &'static str) {
     }
 }
 
-/// Whole numbers from 1 up to this are probably seconds or a count, and no nanoseconds.
+/// Integers from 1 up to this are probably seconds or a count, and not nanoseconds.
 const FEW_NS: u64 = 1_000_000;
 
-/// Returns a time: whole nanoseconds, or seconds as a float.
+/// Returns a time: integer nanoseconds, or seconds as a float.
 ///
 /// # Errors
-/// `TypeError` for something else, `ValueError` for a time that is negative, not finite, or within the
-/// first millisecond but no zero.
+/// `TypeError` for another type, `ValueError` for a time that is negative, not finite, or above
+/// zero but within the first millisecond.
 pub fn stamp(given: &Bound<'_, PyAny>) -> PyResult<Stamp> {
     if let Ok(nanos) = given.extract::<u64>() {
         if (1..FEW_NS).contains(&nanos) {

@@ -33,13 +33,13 @@ use wheels::{drive, take_enable, tell_untimely};
 
 pub(crate) use wheels::sources;
 
-/// Longest wait for messages before the end is checked.
+/// Maximum time to wait for messages before the end condition is checked.
 pub(crate) const TURN: Duration = Duration::from_millis(50);
-/// Time without a frame after which a message is logged.
+/// Time without a frame after which this is logged.
 const SILENCE: Duration = Duration::from_secs(2);
-/// Least time between two heartbeats, and between two looks for other publishers.
+/// Minimum time between two heartbeats, and between two checks for other publishers.
 const BEAT: Duration = Duration::from_millis(100);
-/// Cause of the latch while the enable has more than one publisher.
+/// Reason for latching while the enable has more than one publisher.
 const CONTESTED: &str = "more than one publisher of the enable";
 /// Age on arrival above which a frame indicates clocks that disagree, s.
 const OLD_S: f64 = 0.5;
@@ -54,22 +54,22 @@ pub(crate) struct Bridge {
     source: LiveSource,
     inbox: Arc<Inbox>,
     clock: Arc<StampClock>,
-    /// Client of Nav2's following server, once that is found. Before the wheels, so that its goal ends
-    /// before their last commands.
+    /// Client of Nav2's following server, once that was found. Declared before the wheels, so that
+    /// its goal ends before their last commands.
     follower: Option<Follower>,
     wheels: Option<Wheels>,
     gates: Gates,
     callers: Callers,
     out: Out,
-    /// Largest speed of the config, m/s.
+    /// Maximum speed in the config, m/s.
     max_speed_mps: f64,
-    /// Last permission that was told.
+    /// Permission that was last reported.
     told: Option<Permission>,
-    /// Number of notes of the source that were told.
+    /// Number of notes of the source that were reported.
     noted: usize,
-    /// Number of other publishers of commands that was told.
+    /// Number of other command publishers that was last reported.
     rivals: usize,
-    /// Number of publishers of resets that was told.
+    /// Number of reset publishers that was last reported.
     resets: usize,
     beat: Option<Instant>,
     base_frame: String,
@@ -77,19 +77,19 @@ pub(crate) struct Bridge {
     frames: u64,
     heard: Instant,
     quiet: bool,
-    /// True while frames have older stamps than those before.
+    /// True while frames have older stamps than earlier ones.
     went_back: bool,
-    /// True if the action of Nav2 cannot be used.
+    /// True if the Nav2 action cannot be used.
     is_refused: bool,
 }
 
-/// Desk of the skill, and the requests that were left there.
+/// Desk for the requests of callers, and the requests that were left there.
 pub(crate) struct Callers {
     pub(crate) desk: Desk,
     pub(crate) requests: Receiver<Request>,
 }
 
-/// State that outlives a bridge, for the next one.
+/// State that outlives a bridge and is passed to the next one.
 pub(crate) struct Surroundings {
     pub(crate) network: Network,
     pub(crate) inbox: Arc<Inbox>,
@@ -98,14 +98,14 @@ pub(crate) struct Surroundings {
     pub(crate) live: Option<Live>,
 }
 
-/// Gates of the topics of the switch.
+/// Gates of the topics that control the switch.
 struct Gates {
     enable: Arc<Gate>,
     reset: Arc<Gate>,
 }
 
 impl Gates {
-    /// Creates the gates, whose messages count for as long as an enable holds.
+    /// Creates the gates; messages count for as long as an enable is valid.
     fn new(lifespan: Duration) -> Self {
         Self { enable: Arc::new(Gate::new(lifespan)), reset: Arc::new(Gate::new(lifespan)) }
     }
@@ -174,8 +174,7 @@ impl Bridge {
         self.tell_action(tell);
     }
 
-    /// Listens to the topics that let the robot move, stop it, and reset it; not without a
-    /// controller.
+    /// Subscribes to the topics that enable, stop and reset the robot; only with a controller.
     pub(crate) fn listen_to_switch(&mut self) -> Result<Vec<Ear>, BridgeError> {
         let Some(wheels) = &self.wheels else { return Ok(Vec::new()) };
         let Options { enable, reset, .. } = &self.options;
@@ -189,8 +188,8 @@ impl Bridge {
         let gate = Arc::clone(&self.gates.reset);
         let topic = reset.clone();
         let theirs = Arc::clone(inbox);
-        // The thread that owns the pipeline clears its fault as well. The time is that of the
-        // publication, so that a stop that comes in between is not cleared.
+        // A reset also clears the fault of the pipeline, in the thread that owns it. It is stamped
+        // with its time of publication, so that a stop that arrives in between is not cleared.
         let reset = self.network.listen_to_reset(reset, inbox, move |origin| {
             let Ok(age) = gate.admit(origin, Instant::now(), system_time()) else { return };
             let published = switch.now().saturating_sub(age);
@@ -201,14 +200,14 @@ impl Bridge {
         let theirs = Arc::clone(inbox);
         let key = topic.clone();
         let max_speed_mps = self.max_speed_mps;
-        // Only the newest limit holds.
+        // Only the newest limit applies.
         let limit = self.network.listen_to_speed_limit(topic, inbox, move |limit| {
             theirs.push(&key, limit.mps(max_speed_mps).to_le_bytes().to_vec(), 1);
         })?;
         Ok(vec![enable, reset, limit])
     }
 
-    /// Offers the verbs of the skill as services; not without a controller.
+    /// Offers the requests of callers as services; only with a controller.
     pub(crate) fn offer_services(&mut self) -> Result<Vec<Ear>, BridgeError> {
         if self.wheels.is_none() {
             return Ok(Vec::new());
@@ -216,22 +215,22 @@ impl Bridge {
         services::offer(&mut self.network, self.options.rmw, &self.callers.desk)
     }
 
-    /// Returns the switch of the wheels, if there are some.
+    /// Returns the switch of the wheels; `None` without wheels.
     pub(crate) fn switch(&self) -> Option<SwitchHandle> {
         self.wheels.as_ref().map(Wheels::switch)
     }
 
-    /// Notes that the node is not active; its switch is latched by then.
+    /// Notes that the node is not active; its switch is already latched.
     pub(crate) fn rest(&mut self) {
         self.diagnostics.rest();
         self.out.clear();
-        // A robot that is activated again says anew what it needs.
+        // A robot that is activated again must report again what it needs.
         self.told = None;
     }
 
-    /// Prepares for work after a rest.
+    /// Prepares for working after a rest.
     pub(crate) fn resume(&mut self) {
-        // Images that came in the meantime are old.
+        // Images that arrived in the meantime are old.
         drop(self.inbox.take(Duration::ZERO));
         if let Some(switch) = self.switch() {
             switch.resume();
@@ -245,7 +244,7 @@ impl Bridge {
         tell: &dyn Fn(&str),
     ) -> Result<(), BridgeError> {
         self.callers.desk.open();
-        // Silence before the work is none.
+        // Silence before the work started does not count.
         (self.heard, self.quiet) = (Instant::now(), false);
         while !is_over() {
             for Arrival { topic, arrival_ns, message } in self.inbox.take(TURN) {
@@ -257,7 +256,7 @@ impl Bridge {
             }
             self.serve_callers(tell);
             self.check_calibration()?;
-            // Only the newest frame: a slow pipeline must not fall behind the robot.
+            // Only the newest frame, because a slow pipeline must not fall behind the robot.
             match self.source.newest_frame() {
                 Some(found) => self.step(found, tell)?,
                 None => self.look_for_silence(tell)?,
@@ -282,13 +281,13 @@ impl Bridge {
                 Ok(()) => format!("{verb}"),
                 Err(reason) => format!("{verb}: refused: {reason}"),
             });
-            // A caller that is gone needs no answer.
+            // If the caller is gone, the answer is not needed.
             let _gone = answer.send(done);
         }
     }
 
-    /// Ends a drive by a calibration that is no longer that of the camera: the places of people and
-    /// obstacles would be wrong.
+    /// Ends the run if the camera's calibration is no longer valid, because the positions of people
+    /// and obstacles would be wrong.
     fn check_calibration(&self) -> Result<(), BridgeError> {
         let changes = self.source.counters().get("camera_info_changes").copied().unwrap_or(0);
         if changes == 0 || self.wheels.is_none() {
@@ -298,8 +297,8 @@ impl Bridge {
         Err(BridgeError::Calibration(topic))
     }
 
-    /// Tells notes of the source, changes of the permission to move and other publishers of
-    /// commands, and publishes the heartbeat.
+    /// Reports notes of the source, changes of the permission to move and other command publishers,
+    /// and publishes the heartbeat.
     fn report_state(&mut self, tell: &dyn Fn(&str)) {
         if self.beat.is_some_and(|beat| beat.elapsed() < BEAT) {
             return;
@@ -337,8 +336,8 @@ impl Bridge {
         });
     }
 
-    /// Counts the publishers on the topics of the switch and on that of the commands, and tells what
-    /// does not count for them.
+    /// Counts the publishers on the switch topics and on the command topic, and reports messages
+    /// that were ignored for that reason.
     fn look_at_publishers(&mut self, tell: &dyn Fn(&str)) {
         let Options { enable, reset, command, .. } = &self.options;
         let [enables, resets, rivals] = self.network.others_on([enable, reset, command]);
@@ -353,19 +352,20 @@ impl Bridge {
         }
         tell_untimely(&self.gates.enable, "`true`", enable, tell);
         tell_untimely(&self.gates.reset, "message", reset, tell);
-        // Nav2 drives where it is told to follow.
+        // With `--follow-object`, Nav2 is supposed to publish commands.
         let rivals = if self.options.follow_object.is_some() { 0 } else { rivals };
         if rivals > self.rivals {
             tell(&format!(
-                "{rivals} other publishers of commands on {command}: two drivers at one wheel; let one \
-                 of them publish elsewhere (`--command`) and a multiplexer choose"
+                "{rivals} other publishers of commands on {command}: the robot gets commands from \
+                 several nodes; let one of them publish elsewhere (`--command`), and let a \
+                 multiplexer choose"
             ));
         }
         self.rivals = rivals;
         if resets > 1 && self.resets <= 1 {
             tell(&format!(
-                "{resets} publishers on {reset}: no message on it counts; end all but one (`ros2 topic \
-                 info --verbose` names them)"
+                "{resets} publishers on {reset}: messages on it are ignored; end all but one \
+                 (`ros2 topic info --verbose` names them)"
             ));
         }
         self.resets = resets;
@@ -379,7 +379,7 @@ impl Bridge {
         }
     }
 
-    /// Takes a frame through the pipeline and publishes the results.
+    /// Runs the pipeline on a frame and publishes the results.
     fn step(&mut self, mut found: LogFrame, tell: &dyn Fn(&str)) -> Result<(), BridgeError> {
         (self.heard, self.quiet) = (Instant::now(), false);
         let timing = self.clock.record_frame(found.frame.stamp);
@@ -388,12 +388,12 @@ impl Bridge {
         }
         self.tell_old_stamps(timing.back_s, tell);
         found.frame = found.frame.with_latency(Some(timing.latency_s));
-        // Before the step, so that the command of this very frame is a stop.
+        // Before the step, so that the command of this frame is already a stop.
         if found.frame.odometry_jumped {
             self.disarm("odometry jumped", tell);
         }
         self.diagnostics.begin_frame();
-        // The commands of Nav2 are not those that the base should execute by the pipeline.
+        // If Nav2 drives, the base does not execute the commands of the pipeline.
         let is_driving = self.options.follow_object.is_none()
             && self.switch().is_some_and(|switch| switch.permission().is_granted())
             && !found.odom_stale;
@@ -403,9 +403,9 @@ impl Bridge {
         if let Some(cause) = self.pipeline.fault().filter(|cause| Some(*cause) != known) {
             self.latch(cause, tell);
         }
-        // A robot with stale odometry must not move, but may again afterwards.
+        // A robot with stale odometry must not move, but may do so again afterwards.
         self.obey(!found.odom_stale);
-        // Returned only now, so that the wheels hear of a failed step.
+        // Returned only now, so that the wheels are informed of a failed step.
         let report = report?;
         self.frames += 1;
         let status = self.pipeline.status();
@@ -425,7 +425,7 @@ impl Bridge {
 
     fn obey(&self, may_move: bool) {
         if let Some(wheels) = &self.wheels {
-            // Where Nav2 drives, this program says nothing but a stop.
+            // If Nav2 drives, this program publishes nothing but stops.
             let may_move = may_move && self.options.follow_object.is_none();
             wheels.obey(self.pipeline.orders().filter(|_| may_move));
         }
@@ -433,7 +433,8 @@ impl Bridge {
 
     /// Publishes the results.
     fn publish(&mut self, found: &LogFrame, report: &FrameReport) {
-        // Without odometry the frame `odom` does not exist, and a viewer could place no person in it.
+        // Without odometry the frame `odom` does not exist, and a viewer could not place a person
+        // in it.
         let world = if self.source.has_odometry() { &self.odom_frame } else { &self.base_frame };
         let record = FrameRecord {
             index: report.index,
@@ -449,7 +450,7 @@ impl Bridge {
         self.out.publish(&found.frame, &record, report, &self.base_frame, world);
     }
 
-    /// Clears stops and faults that are not newer than the message; not while the enable has more than
+    /// Clears stops and faults that are not newer than the message, unless the enable has more than
     /// one publisher.
     fn reset(&mut self, data: &[u8], tell: &dyn Fn(&str)) {
         let enables = self.gates.enable.discovered();
@@ -466,14 +467,14 @@ impl Bridge {
         }
     }
 
-    /// Takes in a speed limit of a planner.
+    /// Applies a speed limit of a planner.
     fn limit_speed(&mut self, data: &[u8], tell: &dyn Fn(&str)) {
         let most_mps = <[u8; 8]>::try_from(data).map_or(0.0, f64::from_le_bytes);
         self.pipeline.allow_speed(most_mps);
         tell(&if most_mps.is_finite() {
             format!("speed limit: {most_mps:.2} m/s")
         } else {
-            "no speed limit beside that of the config".to_owned()
+            "no speed limit other than that of the config".to_owned()
         });
     }
 
@@ -502,14 +503,14 @@ impl Bridge {
         }
     }
 
-    /// Tells once that stamps went back: the clock does not, so that no command of these frames is
-    /// valid.
+    /// Reports once that stamps went back: the clock does not go back, so no command of these
+    /// frames is valid.
     fn tell_old_stamps(&mut self, back_s: f64, tell: &dyn Fn(&str)) {
         let went_back = back_s > 0.0;
         if went_back && !self.went_back {
             tell(&format!(
-                "the stamps of the images went back by {back_s:.1} s: the robot stands until they are \
-                 newer than before; restart the bridge if a simulation or a log has begun again"
+                "the stamps of the images went back by {back_s:.1} s: the robot stands until they \
+                 are newer than before; restart the bridge if a simulation or a log was restarted"
             ));
         }
         self.went_back = went_back;
@@ -538,10 +539,10 @@ impl Bridge {
         }
     }
 
-    /// Stops the robot; returns the counts and what outlives the bridge, such as the network, which
-    /// must outlast the last command.
+    /// Stops the robot; returns the counts and the state that outlives the bridge, such as the
+    /// network, which must outlast the last command.
     pub(crate) fn finish(mut self) -> (Summary, Surroundings) {
-        // Its goal is cancelled while the wheels still send zeros.
+        // The goal is cancelled while the wheels still send zeros.
         self.follower.take();
         self.out.clear();
         let summary = self.summary();

@@ -1,4 +1,4 @@
-//! Thread that publishes the state of the bridge, also while a frame takes long.
+//! Thread that publishes the state of the bridge, even while a frame takes long.
 
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -14,7 +14,7 @@ use crate::skill::STUCK;
 use crate::stamps::StampClock;
 use crate::{BridgeError, threads};
 
-/// Time between two messages.
+/// Time between two diagnostic messages.
 const EACH: Duration = Duration::from_secs(1);
 /// Time without a frame from which on the state is stale.
 const STALE_AFTER: Duration = Duration::from_secs(1);
@@ -29,7 +29,7 @@ const STALE: u8 = 3;
 pub(crate) struct Status {
     /// Frames that the pipeline processed.
     pub(crate) frames: u64,
-    /// Time since which a frame is in the pipeline.
+    /// Time since which the present frame has been in the pipeline.
     pub(crate) frame_since: Option<Instant>,
     /// Time of the last frame.
     pub(crate) heard: Instant,
@@ -37,13 +37,13 @@ pub(crate) struct Status {
     pub(crate) permission: Option<Permission>,
     /// Fault of the pipeline.
     pub(crate) fault: Option<&'static str>,
-    /// Other publishers of commands.
+    /// Number of other command publishers.
     pub(crate) rivals: usize,
-    /// Publishers of the enable.
+    /// Number of enable publishers.
     pub(crate) enable_publishers: usize,
-    /// Enables and resets that did not count for their age.
+    /// Number of enables and resets that were ignored because of their age.
     pub(crate) untimely: u64,
-    /// Messages that could not be decoded.
+    /// Number of messages that could not be decoded.
     pub(crate) malformed: u64,
     /// True while the node is not active.
     pub(crate) is_resting: bool,
@@ -54,9 +54,9 @@ pub(crate) struct Status {
 /// State of Nav2's following server.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum DriverState {
-    /// It is not on the network.
+    /// The server is not on the network.
     Missing,
-    /// It does not confirm that it ends the goal.
+    /// The server has not confirmed that it ends the goal.
     Unconfirmed,
     /// State of the goal in words.
     Goal(&'static str),
@@ -87,14 +87,14 @@ impl Diagnostics {
                 let header = Header::new(clock.now(), "");
                 let status = status.map(|status| status.message(Instant::now()));
                 let status = status.into_iter().collect();
-                // Subscribers are not waited for.
+                // The publisher does not wait for subscribers.
                 let _lost = publisher.publish(DiagnosticArray { header, status });
             }
         })?;
         Ok(Self { status, end: Some(end), thread: Some(thread) })
     }
 
-    /// Sets the state after a turn of the loop.
+    /// Sets the state after an iteration of the loop.
     pub(crate) fn update(&self, status: Status) {
         *self.status.lock().unwrap_or_else(PoisonError::into_inner) = Some(status);
     }
@@ -107,7 +107,7 @@ impl Diagnostics {
         }
     }
 
-    /// Notes that a frame goes into the pipeline.
+    /// Notes that the pipeline starts to process a frame.
     pub(crate) fn begin_frame(&self) {
         if let Some(status) = &mut *self.status.lock().unwrap_or_else(PoisonError::into_inner) {
             status.frame_since = Some(Instant::now());
@@ -123,7 +123,7 @@ impl Drop for Diagnostics {
 }
 
 impl Status {
-    /// Returns the message for a time: its level is that of the worst of its causes.
+    /// Returns the message at a time: its level is that of the most severe cause.
     fn message(&self, now: Instant) -> DiagnosticStatus {
         let (level, message) = self.worst(now);
         let values = [
@@ -182,7 +182,7 @@ impl Status {
             }
             _ if self.malformed > 0 => (WARN, "messages that do not decode".into()),
             Some(permission) if self.enable_publishers == 0 && !permission.is_granted() => {
-                (OK, format!("{}: nobody publishes the enable", permission.cause()))
+                (OK, format!("{}: no node publishes the enable", permission.cause()))
             }
             Some(permission) => (OK, permission.cause().into()),
             None => (OK, "tracks people".into()),
@@ -225,7 +225,7 @@ mod tests {
         for (status, level, message) in [
             (well, OK, "enabled"),
             (Status { permission: latched, ..well }, WARN, "switched off"),
-            (unheard, OK, "not enabled: nobody publishes the enable"),
+            (unheard, OK, "not enabled: no node publishes the enable"),
             (contested, ERROR, "2 publishers of the enable: end all but one"),
             (fault, ERROR, "fault: odometry jumped"),
             (missing, WARN, "no following server of Nav2"),

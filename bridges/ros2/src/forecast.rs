@@ -1,8 +1,8 @@
-//! Forecast of where people will walk, as a grid for social layers of costmaps.
+//! Forecast of people's positions, as a grid for social layers of costmaps.
 //!
-//! Each confirmed person goes on at the estimated velocity, and the uncertainty of position and
-//! velocity spreads with time. A cell has the probability that a person comes near to it at some moment
-//! of the next seconds, the later the less.
+//! Each confirmed person is assumed to continue at the estimated velocity, and the uncertainty of
+//! position and velocity grows with time. The value of a cell is the probability that a person
+//! comes near it within the next seconds; later times have less weight.
 
 use nalgebra::{Isometry2, Matrix2, Point2, Vector2};
 use serde::{Deserialize, Serialize};
@@ -14,25 +14,26 @@ mod sight;
 
 use sight::Sight;
 
-/// Distance within which a person makes a cell occupied, m: that of a shoulder, and of a step aside.
+/// Distance within which a person occupies a cell, m: the width of a shoulder and a step aside.
 const NEAR_M: f64 = 0.5;
-/// Time between two places of a forecast, s: a fast walker, 2 m/s, comes less than `NEAR_M` farther.
+/// Time between two positions of a forecast, s: a fast walker, at 2 m/s, moves less than `NEAR_M`
+/// in that time.
 const STEP_S: f64 = 0.2;
-/// Time after which a forecast weighs half as much, s.
+/// Time after which the weight of a forecast is halved, s.
 const HALF_LIFE_S: f64 = 2.0;
-/// Least time between two grids, s: costmaps are updated five times a second, and a grid is as large as
-/// a small image.
+/// Minimum time between two grids, s: costmaps are updated five times a second, and a grid is as
+/// large as a small image.
 const EACH_S: f64 = 0.2;
-/// Value of cells that no sensor sees.
+/// Value of cells that no sensor observes.
 const UNKNOWN: i8 = -1;
 
 /// Frame of the grid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum ForecastFrame {
-    /// That of the odometry, in which costmaps live: the grid moves along by whole cells.
+    /// The odometry frame, in which costmaps are: the grid moves with the robot by whole cells.
     #[default]
     Odom,
-    /// That of the robot, X ahead.
+    /// The robot frame, with X forward.
     Robot,
 }
 
@@ -44,7 +45,7 @@ pub(crate) struct ForecastSettings {
     pub(crate) resolution_m: f64,
     /// Side of the grid, m; the robot is in its middle.
     pub(crate) size_m: f64,
-    /// Time for which people are forecast, s.
+    /// Time horizon of the forecast, s.
     pub(crate) horizon_s: f64,
 }
 
@@ -60,29 +61,29 @@ pub(crate) struct MapMetaData {
     origin: Pose,
 }
 
-/// `nav_msgs/OccupancyGrid`: rows along X, from the least Y on.
+/// `nav_msgs/OccupancyGrid`: rows along X, starting at the lowest Y.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct OccupancyGrid {
     header: Header,
     info: MapMetaData,
-    /// Percent, or -1 for unknown.
+    /// Probability in per cent, or -1 for unknown.
     data: Vec<i8>,
 }
 
-/// Moment of which a forecast is made.
+/// Moment for which a forecast is made.
 #[derive(Clone, Copy)]
 pub(crate) struct Now<'a> {
     pub(crate) frame: &'a Frame,
     pub(crate) tracks: &'a [Track],
     /// Pose of the robot in the odometry frame.
     pub(crate) odom_from_robot: &'a Isometry2<f64>,
-    /// Name of the robot's frame.
+    /// Name of the robot frame.
     pub(crate) base_frame: &'a str,
-    /// Name of the odometry frame; that of the robot's where there is no odometry.
+    /// Name of the odometry frame; that of the robot frame without odometry.
     pub(crate) world: &'a str,
 }
 
-/// Maker of the grids of a run.
+/// Generator of the grids of a run.
 pub(crate) struct Forecast {
     settings: ForecastSettings,
     /// Stamp of the last grid.
@@ -90,12 +91,12 @@ pub(crate) struct Forecast {
 }
 
 impl Forecast {
-    /// Creates a maker.
+    /// Creates a generator.
     pub(crate) fn new(settings: ForecastSettings) -> Self {
         Self { settings, last: None }
     }
 
-    /// Returns the grid of a frame; `None` too soon after the last one to be of use.
+    /// Returns the grid for a frame; `None` if the last one is too recent.
     pub(crate) fn grid(&mut self, now: Now<'_>) -> Option<OccupancyGrid> {
         let stamp = now.frame.stamp;
         let is_soon = self.last.is_some_and(|last| {
@@ -111,8 +112,8 @@ impl Forecast {
     }
 }
 
-/// Returns the grid of a moment; `sees` says whether the sensors see a standing person at a place on
-/// the floor, robot frame.
+/// Returns the grid for a moment; `sees` returns true if the sensors would see a standing person at
+/// a position on the floor, in the robot frame.
 fn grid(
     settings: &ForecastSettings,
     now: Now<'_>,
@@ -164,29 +165,29 @@ fn grid(
 struct Layout {
     /// Outer corner of the first cell, m.
     corner: Point2<f64>,
-    /// Cells of a side.
+    /// Number of cells along a side.
     side: usize,
     cell_m: f64,
 }
 
 impl Layout {
-    /// Returns the grid around a place. Its corner is a whole number of cells from the origin, so that
-    /// cells stay where they are while the robot drives.
+    /// Returns the grid around a position. Its corner is an integer number of cells from the
+    /// origin, so that cells do not shift while the robot drives.
     fn around(middle: Vector2<f64>, side: usize, cell_m: f64) -> Self {
         let half = (side / 2) as f64;
         let corner = middle.map(|along| ((along / cell_m).round() - half) * cell_m);
         Self { corner: corner.into(), side, cell_m }
     }
 
-    /// Returns the middle of a cell.
+    /// Returns the centre of a cell.
     fn middle(&self, number: usize) -> Point2<f64> {
         let column = (number % self.side) as f64 + 0.5;
         let row = (number / self.side) as f64 + 0.5;
         self.corner + Vector2::new(column, row) * self.cell_m
     }
 
-    /// Returns the columns, or rows, of cells within `reach_m` of a coordinate; `corner_m` is that of
-    /// the corner.
+    /// Returns the columns, or rows, of cells within `reach_m` of a coordinate; `corner_m` is the
+    /// coordinate of the corner.
     fn span(&self, at_m: f64, reach_m: f64, corner_m: f64) -> std::ops::Range<usize> {
         let side = self.side as f64;
         let first = ((at_m - reach_m - corner_m) / self.cell_m).floor().clamp(0.0, side);
@@ -195,13 +196,13 @@ impl Layout {
     }
 }
 
-/// Walk of one person at constant velocity, in the frame of the grid.
+/// Motion of one person at constant velocity, in the frame of the grid.
 struct Walk {
     at: Point2<f64>,
     velocity: Vector2<f64>,
     /// Covariance of the position, m².
     place: Matrix2<f64>,
-    /// Covariance of position and velocity with its transpose added, m²/s.
+    /// Covariance of position and velocity, plus its transpose, m²/s.
     cross: Matrix2<f64>,
     /// Covariance of the velocity, m²/s².
     speed: Matrix2<f64>,
@@ -225,13 +226,14 @@ impl Walk {
         }
     }
 
-    /// Enters the person after `ahead_s` into the cells.
+    /// Adds the person after `ahead_s` to the cells.
     fn add(&self, ahead_s: f64, layout: &Layout, chances: &mut [f64]) {
         let middle = self.at + self.velocity * ahead_s;
         let spread = self.place + self.cross * ahead_s + self.speed * (ahead_s * ahead_s);
-        // A disc of this radius has this variance along each axis: the sum is that of person and disc.
+        // A disc of this radius has this variance along each axis; the sum is the covariance of
+        // person and disc together.
         let disc = Matrix2::identity() * (0.25 * NEAR_M * NEAR_M);
-        // A filter may report a covariance that is none: the person is somewhere nevertheless.
+        // A filter may report an invalid covariance, but the person is somewhere nevertheless.
         let is_proper = spread.diagonal().min() >= 0.0 && (spread + disc).determinant() > 0.0;
         let sum = if is_proper { spread + disc } else { disc };
         let Some(inverse) = sum.try_inverse() else { return };

@@ -1,4 +1,4 @@
-//! The verbs of the skill as HTTP with JSON on loopback.
+//! The requests of callers as HTTP with JSON on loopback.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -12,10 +12,10 @@ use tagalong_serve::{Access, Changes, Request, Response, Server, Site};
 use crate::BridgeError;
 use crate::skill::{Desk, Refusal, Verb};
 
-/// Longest body of a request, bytes: an enrollment has some dozens.
+/// Maximum length of a request body, bytes; an enrollment takes some dozens.
 const BODY_BYTES: usize = 4 << 10;
 
-/// HTTP server of the desk; it ends when it is dropped.
+/// HTTP server for the desk; it ends when it is dropped.
 pub(crate) struct HttpServer {
     address: String,
     stop: Arc<AtomicBool>,
@@ -31,15 +31,15 @@ struct Answer<'a> {
 }
 
 impl HttpServer {
-    /// Starts to listen.
+    /// Starts listening.
     ///
     /// # Errors
-    /// [`BridgeError::Config`] for an address that is not on loopback, or that is taken.
+    /// [`BridgeError::Config`] for an address that is not on loopback, or that is in use.
     pub(crate) fn start(address: SocketAddr, desk: Desk) -> Result<Self, BridgeError> {
-        // Any program that reaches the port chooses the person that the robot drives after.
+        // Any program that reaches the port can choose the person that the robot follows.
         if !address.ip().is_loopback() {
-            let why = "must be an address of this computer, as 127.0.0.1:8080; put a proxy with \
-                       authentication before it for others";
+            let why = "must be an address of this computer, such as 127.0.0.1:8080; for other \
+                       computers, put a proxy with authentication in front of it";
             return Err(BridgeError::Config(format!("--http {address}: {why}")));
         }
         let mut access = Access::at(address).with_changes(Changes::FromPrograms);
@@ -72,7 +72,7 @@ impl Drop for HttpServer {
     }
 }
 
-/// Verbs by their paths.
+/// Requests by their paths.
 struct Skill(Desk);
 
 impl Site for Skill {

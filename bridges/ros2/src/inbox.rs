@@ -4,16 +4,16 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Waiting messages, a few of each topic. A slow reader misses the oldest.
+/// Queue with a few waiting messages of each topic. A slow reader misses the oldest.
 #[derive(Debug)]
 pub struct Inbox {
     topics: Mutex<BTreeMap<String, Topic>>,
     arrived: Condvar,
-    /// Start of the clock of the arrivals.
+    /// Start of the clock for arrivals.
     opened: Instant,
 }
 
-/// Message of a topic with the time of its arrival.
+/// Message of a topic, with its time of arrival.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Arrival {
     /// The topic.
@@ -26,7 +26,7 @@ pub struct Arrival {
 
 #[derive(Debug, Default)]
 struct Topic {
-    /// Times of arrival with the messages.
+    /// Messages with their times of arrival.
     waiting: VecDeque<(u64, Vec<u8>)>,
     traffic: Traffic,
 }
@@ -44,12 +44,13 @@ pub struct Traffic {
     pub received: u64,
     /// Messages that were dropped because newer ones arrived before they were read.
     pub dropped: u64,
-    /// Messages whose bytes are not of the type that their topic states.
+    /// Messages whose bytes do not match the type of their topic.
     pub malformed: u64,
 }
 
 impl Inbox {
-    /// Adds a message; of the same topic, `room` are kept and the oldest dropped.
+    /// Adds a message. At most `room` messages of the same topic are kept; the oldest ones are
+    /// dropped.
     pub fn push(&self, topic: &str, message: Vec<u8>, room: usize) {
         let arrival_ns = u64::try_from(self.opened.elapsed().as_nanos()).unwrap_or(u64::MAX).max(1);
         self.with_topic(topic, |Topic { waiting, traffic }| {
@@ -77,8 +78,8 @@ impl Inbox {
         topics.get_mut(name).map(change);
     }
 
-    /// Returns all waiting messages by topic, in the order of arrival within a topic; empty if none
-    /// arrives within `patience`.
+    /// Returns all waiting messages by topic, in the order of arrival within each topic; empty if
+    /// none arrives within `patience`.
     pub fn take(&self, patience: Duration) -> Vec<Arrival> {
         let waited = self.arrived.wait_timeout_while(self.lock(), patience, |topics| {
             topics.values().all(|topic| topic.waiting.is_empty())

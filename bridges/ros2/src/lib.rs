@@ -4,26 +4,27 @@
 //!
 //! Frames are made from messages by [`tagalong::log::Listening`] and [`tagalong::log::LiveSource`],
 //! the same code that reads logs: images are paired by the stamps in their headers, topics are
-//! found by type, and a config that ran on a recorded log runs live.
+//! found by type, and a config that works on a recorded log also works live.
 //!
 //! # Threads that must not wait for each other
 //!
-//! * One per topic takes messages from DDS into the [`inbox`], which drops the oldest and counts
-//!   them.
-//! * The one that calls [`run`] makes frames and takes them through the pipeline, always the
+//! * One thread per topic takes messages from DDS into the [`inbox`], which drops the oldest ones
+//!   and counts them.
+//! * The thread that calls [`run`] makes frames and runs the pipeline on them, always on the
 //!   newest.
-//! * One drives the [`wheels`]: it sends a command at least twenty times a second, from a copy of
-//!   the last orders of the pipeline, and zero once those have expired. A pipeline that is stuck in
-//!   a frame therefore stops the robot too. The topics that enable and stop reach this thread
-//!   directly.
+//! * One thread drives the [`wheels`]: it sends a command at least twenty times a second, from a
+//!   copy of the last orders of the pipeline, and zero once those have expired. A pipeline that is
+//!   stuck in a frame therefore stops the robot as well. The topics that enable and stop reach this
+//!   thread directly.
 //!
-//! * With `--follow-object`, one gives Nav2's following server its goal, and cancels it.
-//! * Those of the services of a managed node stop the robot before the node leaves the active state.
-//! * One publishes diagnostics every second, also while a frame takes long.
-//! * With `--serve`, some answer browsers from the newest frame; no frame waits for them.
+//! * With `--follow-object`, one thread gives Nav2's following server its goal, and cancels it.
+//! * The threads of the services of a managed node stop the robot before the node leaves the active
+//!   state.
+//! * One thread publishes diagnostics every second, even while a frame takes long.
+//! * With `--serve`, some threads serve the newest frame to browsers; no frame waits for them.
 //!
-//! If [`run`] ends by an error, a signal or a panic, the owner of the last thread is dropped, and
-//! with it the last command on the wire is zero.
+//! If [`run`] ends with an error, a signal or a panic, the owner of the wheel thread is dropped, so
+//! that the last command that is sent is zero.
 //!
 //! This is no safety function. See the README.
 
@@ -65,7 +66,7 @@ pub enum BridgeError {
     /// DDS reported an error.
     #[error("ROS 2: {0}")]
     Network(String),
-    /// The page of what happens now cannot be served.
+    /// The live page cannot be served.
     #[error("cannot serve on {0}: {1}; name another port with --serve=PORT")]
     Serve(std::net::SocketAddr, std::io::Error),
     /// No further thread can be started.
@@ -77,10 +78,10 @@ pub enum BridgeError {
     /// An input of the pipeline did not arrive, or cannot be used.
     #[error(transparent)]
     Input(Box<tagalong::log::LogError>),
-    /// The controller lacks a source that its config demands.
+    /// The controller lacks a source that its config requires.
     #[error(transparent)]
     Sources(#[from] tagalong::pipeline::MissingSource),
-    /// The camera's calibration changed while the robot was driven by the former one.
+    /// The camera's calibration changed while the robot was steered with the previous one.
     #[error(
         "the calibration of the camera changed (topic {0}): the robot was told to stop; restart the \
          bridge to take the new one"
@@ -111,7 +112,8 @@ impl From<tagalong::Error> for BridgeError {
 }
 
 impl BridgeError {
-    /// Returns the exit code of a program that ends with this error: 2 for wrong usage, else 1.
+    /// Returns the exit code of a program that ends with this error: 2 for wrong usage, otherwise
+    /// 1.
     pub fn exit_code(&self) -> u8 {
         if matches!(self, Self::Config(_) | Self::Serve(..)) { 2 } else { 1 }
     }

@@ -1,7 +1,7 @@
-//! The node as a managed one (`lifecycle_msgs`): its services and its topic of transitions.
+//! The node as a managed node (`lifecycle_msgs`): its services and its topic of transitions.
 //!
-//! The services have threads of their own. A request is checked there against the state, and one that
-//! ends the work stops the robot at once, also while a frame takes long; the thread that owns the
+//! The services have their own threads. There a request is checked against the state, and one that
+//! ends the work stops the robot at once, even while a frame takes long; the thread that owns the
 //! pipeline then carries it out and answers.
 
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -27,8 +27,8 @@ pub(crate) use graph::{
 };
 use graph::{STATES, TRANSITIONS};
 
-/// Longest wait for a transition before a caller is refused; a pipeline that is stuck in a frame goes
-/// on with it afterwards.
+/// Maximum time for a transition before the caller gets a refusal; a pipeline that is stuck in a
+/// frame completes the transition afterwards.
 const PATIENCE: Duration = Duration::from_secs(4);
 
 /// `lifecycle_msgs/State`, and `lifecycle_msgs/Transition`, which has the same fields.
@@ -38,7 +38,7 @@ struct Named {
     label: String,
 }
 
-/// Request without fields, which has one byte on the wire.
+/// Request without fields, which is one byte in DDS.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct NoRequest {
     structure_needs_at_least_one_member: u8,
@@ -105,7 +105,7 @@ impl From<Transition> for Description {
     }
 }
 
-/// Transition for which a caller asked, with the channel of its answer.
+/// Transition that a caller requested, with the channel for the answer.
 pub(crate) struct Order {
     pub(crate) transition: Transition,
     answer: SyncSender<bool>,
@@ -114,7 +114,7 @@ pub(crate) struct Order {
 impl Order {
     /// Tells the caller whether the transition succeeded.
     pub(crate) fn answer(self, success: bool) {
-        // A caller whose patience ended needs no answer.
+        // If the caller has timed out, the answer is not needed.
         let _gone = self.answer.send(success);
     }
 }
@@ -126,13 +126,13 @@ pub(crate) struct Lifecycle {
     events: Publisher<TransitionEvent>,
 }
 
-/// State that the threads of the services share.
+/// State that is shared by the threads of the services.
 struct StateDesk {
     state: Mutex<NodeState>,
-    /// Switch of the wheels, where there are some.
+    /// Switch of the wheels; `None` without wheels.
     switch: Mutex<Option<SwitchHandle>>,
     orders: SyncSender<Order>,
-    /// True once an order waits, until its owner looks for it.
+    /// True while an order waits, until its owner takes it.
     is_asked: AtomicBool,
 }
 
@@ -204,19 +204,19 @@ impl Lifecycle {
         self.desk.is_asked.load(Ordering::Relaxed)
     }
 
-    /// Returns the transition for which a caller asks, if one does within `patience`.
+    /// Returns the transition that a caller requests within `patience`, if any.
     pub(crate) fn next_order(&self, patience: Duration) -> Option<Order> {
         self.desk.is_asked.store(false, Ordering::Relaxed);
-        // The desk holds a sender as long as this value lives.
+        // The desk holds a sender for the lifetime of this value, so the channel cannot be closed.
         self.orders.recv_timeout(patience).ok()
     }
 
-    /// Sets the switch that a request to end the work latches.
+    /// Sets the switch that is latched by a request to end the work.
     pub(crate) fn set_switch(&self, switch: Option<SwitchHandle>) {
         *self.desk.switch() = switch;
     }
 
-    /// Begins a transition.
+    /// Starts a transition.
     pub(crate) fn begin(&self, transition: Transition) {
         if transition.stops() {
             self.desk.halt();
@@ -224,7 +224,7 @@ impl Lifecycle {
         self.pass(transition);
     }
 
-    /// Ends the transition that was begun; returns the new state.
+    /// Ends the transition that was started; returns the new state.
     pub(crate) fn end(&self, ending: Ending) -> NodeState {
         if let Some(transition) = self.state().ended(ending) {
             self.pass(transition);
@@ -236,7 +236,7 @@ impl Lifecycle {
         *self.desk.lock() = transition.goal;
         let timestamp = system_time().nanos();
         let description = transition.into();
-        // Subscribers are not waited for.
+        // The publisher does not wait for subscribers.
         let _lost = self.events.publish(TransitionEvent { timestamp, description });
     }
 }
@@ -260,7 +260,7 @@ impl StateDesk {
         }
     }
 
-    /// Asks for a transition and waits for its end; returns whether it succeeded.
+    /// Requests a transition and waits for its end; returns true if it succeeded.
     fn change(&self, id: u8, label: &str) -> bool {
         let Some(transition) = self.state().asked_for(id, label) else { return false };
         if transition.stops() {
@@ -268,7 +268,7 @@ impl StateDesk {
         }
         let (answer, answered) = sync_channel(1);
         let is_taken = self.orders.try_send(Order { transition, answer }).is_ok();
-        // After the order, so that it is there once the flag is seen.
+        // Set after the order was sent, so that the order is there when the flag is seen.
         self.is_asked.store(true, Ordering::Relaxed);
         is_taken && answered.recv_timeout(PATIENCE).unwrap_or(false)
     }

@@ -1,4 +1,4 @@
-//! Wait for the inputs of the pipeline.
+//! Waiting for the inputs of the pipeline.
 
 use std::time::{Duration, Instant};
 
@@ -13,13 +13,14 @@ use crate::{BridgeError, Options};
 /// Time between two attempts to start.
 const ATTEMPT: Duration = Duration::from_millis(500);
 /// Time to wait for other topics after the first image: not every pipeline requires odometry and
-/// transforms, but each is better with them.
+/// transforms, but each works better with them.
 const GATHER: Duration = Duration::from_secs(2);
 
-/// The variable of ROS 2 that says how far nodes look for each other.
+/// The ROS 2 variable that limits discovery.
 const RANGE: &str = "ROS_AUTOMATIC_DISCOVERY_RANGE";
 
-/// Says why no topic of another node may be there; `range` is the value of [`RANGE`] for this program.
+/// Returns a message why no topic of another node may be visible; `range` is the value of [`RANGE`]
+/// for this program.
 fn silence(domain: u16, range: Option<&str>) -> String {
     let set = range.map_or("not set".to_owned(), |range| format!("`{range}`"));
     format!(
@@ -30,7 +31,8 @@ fn silence(domain: u16, range: Option<&str>) -> String {
     )
 }
 
-/// Listens until all inputs of the pipeline are there; returns `None` if `is_over` before.
+/// Listens until all inputs of the pipeline are there; returns `None` if `is_over` becomes true
+/// before.
 pub(crate) fn listen(
     options: &Options,
     setup: &Setup,
@@ -41,7 +43,7 @@ pub(crate) fn listen(
     let Surroundings { network, inbox, clock, .. } = surroundings;
     let name = format!("ROS domain {}", options.domain);
     let inputs = setup.pipeline.inputs();
-    // The page shows colour, whether or not the pipeline uses it.
+    // The page shows colour, even if the pipeline does not use it.
     let inputs = if options.serve.is_some() { inputs.accept(Input::Colour) } else { inputs };
     let mut listening = Listening::new(&name, &setup.input, &setup.limits, inputs)?;
     let mut ears: Vec<Ear> = Vec::new();
@@ -74,17 +76,17 @@ pub(crate) fn listen(
         let is_late = Instant::now() > deadline;
         let gathered = first.is_some_and(|first| first.elapsed() > GATHER);
         let started = listening.start().map_err(BridgeError::from).and_then(|source| {
-            // Odometry and a laser may come later than the images.
+            // Odometry and a laser may arrive later than the images.
             setup.pipeline.check_sources(sources(&source))?;
             Ok(source)
         });
-        // Frames may be made of scans alone.
+        // Frames may be made from scans alone.
         if started.is_ok() {
             first.get_or_insert_with(Instant::now);
         }
         match started {
             Ok(source) if gathered || is_late => {
-                // Topics that the pipeline does not use are no longer received.
+                // Unsubscribes from topics that the pipeline does not use.
                 ears.retain(|ear| source.topics().any(|topic| topic == ear.topic()));
                 return Ok(Some((source, ears)));
             }

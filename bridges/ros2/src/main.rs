@@ -18,7 +18,7 @@ fn main() -> ExitCode {
     let stop = Arc::new(AtomicBool::new(false));
     let signal = Arc::new(AtomicUsize::new(0));
     let listening = [SIGINT, SIGTERM].into_iter().try_for_each(|number| {
-        // The number of the signal determines the exit code.
+        // The exit code depends on the number of the signal.
         flag::register_usize(number, Arc::clone(&signal), number as usize)?;
         flag::register(number, Arc::clone(&stop)).map(drop)
     });
@@ -39,11 +39,11 @@ fn main() -> ExitCode {
     }
 }
 
-/// Checks the config alone.
+/// Only checks the config.
 fn check(options: &Options) -> ExitCode {
     match options.checked(&tagalong::builtin_registry()) {
         Ok(lines) => {
-            // A pipe without a reader is no fault of the config.
+            // A closed pipe is not an error of the config.
             let _closed = write!(std::io::stdout(), "{lines}");
             ExitCode::SUCCESS
         }

@@ -1,9 +1,9 @@
 //! Conversion of messages from DDS to the frame source.
 //!
-//! DDS delivers messages that own their bytes; the log reader takes them as they lie on the wire.
-//! Images and points, which it borrows, therefore have counterparts here that own their bytes and lie
-//! on the wire alike, and received messages are encoded again: a copy of an image, a tenth of a
-//! millisecond.
+//! DDS delivers messages that own their bytes, while the log reader takes the serialised bytes.
+//! Images and points, which it borrows, therefore have counterparts here that own their bytes and
+//! have the same serialised form, and received messages are encoded again: this costs a copy of an
+//! image, a tenth of a millisecond.
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -11,23 +11,24 @@ use serde_bytes::ByteBuf;
 use tagalong::core::Stamp;
 use tagalong::log::msgs::{Header, LaserScan, PointField, Time};
 
-/// Number of images, or clouds of points, that wait for the thread that makes frames.
+/// Number of images, or point clouds, that wait for the thread that makes frames.
 pub(crate) const IMAGES: usize = 2;
 /// Number of other messages that wait.
 pub(crate) const OTHERS: usize = 64;
 
-/// A message of which frames can be made.
+/// A message from which frames can be made.
 pub(crate) trait FrameMessage: DeserializeOwned + Serialize + Send + 'static {
     /// Returns the time of the measurement.
     fn stamp(&self) -> Stamp;
 
-    /// Returns the number of messages like this one that wait; of images the newest alone are of use.
+    /// Returns the maximum number of messages of this type that wait; only the newest images are
+    /// useful.
     fn room(&self) -> usize {
         IMAGES
     }
 }
 
-/// `sensor_msgs/Image` that owns its pixels; field by field as `Image` of the log reader.
+/// `sensor_msgs/Image` that owns its pixels, with the same fields as `Image` of the log reader.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct OwnedImage {
     header: Header,
@@ -89,7 +90,7 @@ pub(crate) struct Bool {
     pub(crate) data: bool,
 }
 
-/// `std_msgs/Empty`, which has one byte on the wire.
+/// `std_msgs/Empty`, which is one byte in DDS.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Empty {
     structure_needs_at_least_one_member: u8,
@@ -99,17 +100,17 @@ pub(crate) struct Empty {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct SpeedLimit {
     pub(crate) header: Header,
-    /// True for a part of the largest speed, in percent.
+    /// True if the limit is a percentage of the maximum speed.
     pub(crate) percentage: bool,
-    /// The limit, m/s or percent; 0 for none.
+    /// The limit, m/s or per cent; 0 for none.
     pub(crate) speed_limit: f64,
 }
 
 impl SpeedLimit {
-    /// Returns the limit of a robot with this largest speed, m/s; infinite for none.
+    /// Returns the limit for a robot with this maximum speed, m/s; infinite for none.
     pub(crate) fn mps(&self, max_speed_mps: f64) -> f64 {
         match self.speed_limit {
-            // As Nav2 has it.
+            // As in Nav2.
             0.0 => f64::INFINITY,
             percent if self.percentage => percent / 100.0 * max_speed_mps,
             speed => speed,
@@ -154,7 +155,7 @@ impl FrameMessage for OwnedCompressedImage {
     }
 
     fn room(&self) -> usize {
-        // Some drivers publish packets of video as images, and each refers to those before it.
+        // Some drivers publish video packets as images, and each packet refers to earlier ones.
         let is_video =
             [&[0, 0, 0, 1][..], &[0, 0, 1]].iter().any(|code| self.data.starts_with(code));
         if is_video { OTHERS } else { IMAGES }
@@ -197,13 +198,13 @@ impl FrameMessage for LaserScan {
     }
 }
 
-/// Converts `sensor_msgs::msg::dds_::Image_`, as DDS names types, to `sensor_msgs/msg/Image`.
+/// Converts `sensor_msgs::msg::dds_::Image_`, a type name in DDS, to `sensor_msgs/msg/Image`.
 pub(crate) fn ros_type(dds: &str) -> Option<String> {
     let (package, name) = dds.split_once("::msg::dds_::")?;
     Some(format!("{package}/msg/{}", name.strip_suffix('_')?))
 }
 
-/// Converts `rt/odom`, as DDS names topics, to `/odom`.
+/// Converts `rt/odom`, a topic name in DDS, to `/odom`.
 pub(crate) fn ros_topic(dds: &str) -> Option<&str> {
     dds.strip_prefix("rt").filter(|name| name.starts_with('/'))
 }

@@ -1,9 +1,10 @@
 //! Nav2's following server as the driver: a client of its action `FollowObject`.
 //!
-//! A thread of its own gives the server a goal while the switch gives permission, frames come, and a
-//! person is followed, and cancels it as soon as one of these ends. It waits for no frame: a pipeline
-//! that is stuck ends the goal, too. A goal that ended against the wish is not given again by itself:
-//! the wish has to end and to begin anew, by a press or by a person that is found again.
+//! A separate thread gives the server a goal while the switch gives permission, frames arrive, and
+//! a person is followed, and cancels it as soon as one of these conditions ends. It waits for no
+//! frame, so a pipeline that is stuck ends the goal as well. A goal that ended unexpectedly is not
+//! sent again automatically: the conditions have to end first and then hold again, through the
+//! button or a person that is found again.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{JoinHandle, sleep};
@@ -21,21 +22,22 @@ mod action;
 
 pub(crate) use action::{Feedback, FollowGoal, FollowResult, HUMBLE, HumbleResult, NAV2, Outcome};
 
-/// Time between two looks at the wish and at the answers.
+/// Time between two checks of the conditions and of the answers.
 const TURN: Duration = Duration::from_millis(10);
 /// Age of the last frame from which on the goal is cancelled.
 const FRAMES: Duration = Duration::from_secs(1);
-/// Longest wait for the answer to a goal.
+/// Maximum time to wait for the answer to a goal.
 const ACCEPT: Duration = Duration::from_secs(3);
-/// Longest time without feedback, which the server sends fifty times a second.
+/// Maximum time without feedback, which the server sends fifty times a second.
 const FEEDBACK: Duration = Duration::from_secs(2);
 /// Time after which a cancellation that is not confirmed is sent again.
 const CONFIRM: Duration = Duration::from_millis(500);
-/// Longest wait for a confirmation when the bridge ends.
+/// Maximum time to wait for a confirmation when the bridge ends.
 const LAST_WAIT: Duration = Duration::from_secs(2);
 
-/// Returns true for a stop of the pipeline that ends the goal: what would stop its own commands stops
-/// those of the server, too. To have no target yet, or to have just begun, is no danger.
+/// Returns true for a stop of the pipeline that ends the goal: whatever would stop its own commands
+/// stops those of the server as well. A missing target and a start-up are no danger and do not
+/// count.
 pub(crate) fn ends_goal(reason: Reason) -> bool {
     !reason.moves() && !matches!(reason, Reason::NoTarget | Reason::Settling)
 }
@@ -45,25 +47,26 @@ pub(crate) fn ends_goal(reason: Reason) -> bool {
 pub(crate) struct GoalReport {
     /// State of the goal: that of the server while it follows.
     pub(crate) state: &'static str,
-    /// Time for which the server has followed, s, by its feedback.
+    /// Time for which the server has followed, s, according to its feedback.
     pub(crate) following_s: f64,
-    /// Times that the server has tried again.
+    /// Number of retries of the server.
     pub(crate) retries: u16,
-    /// Reason for which the last goal ended or was refused.
+    /// Reason why the last goal ended or was rejected.
     pub(crate) reason: Option<String>,
-    /// True while the server does not confirm that it ends the goal: the robot may drive on.
+    /// True while the server has not confirmed that it ends the goal, so that the robot may still
+    /// be driving.
     pub(crate) is_unconfirmed: bool,
 }
 
-/// State that the thread and its owner share.
+/// State that is shared by the thread and its owner.
 #[derive(Default)]
 struct Shared {
     /// True once the server is gone from the network.
     is_gone: bool,
-    /// Time of the last frame, if a person is followed in it.
+    /// Time of the last frame in which a person was followed.
     followed: Option<Instant>,
     report: GoalReport,
-    /// Sentences for the log.
+    /// Messages for the log.
     told: Vec<String>,
     quits: bool,
 }
@@ -75,7 +78,7 @@ pub(crate) struct Follower {
 }
 
 impl Follower {
-    /// Starts the thread; `pose_topic` is the full name of the topic of the target.
+    /// Starts the thread; `pose_topic` is the full name of the topic with the target pose.
     ///
     /// # Errors
     /// [`BridgeError::Thread`].
@@ -95,7 +98,7 @@ impl Follower {
         Ok(Self { shared, thread: Some(thread) })
     }
 
-    /// Notes a frame, and whether a person is followed in it.
+    /// Notes a frame, with true if a person is followed in it.
     pub(crate) fn note_frame(&self, follows: bool) {
         lock(&self.shared).followed = follows.then(Instant::now);
     }
@@ -110,7 +113,7 @@ impl Follower {
         lock(&self.shared).report.clone()
     }
 
-    /// Returns the sentences since the last call.
+    /// Returns the messages since the last call.
     pub(crate) fn take_told(&self) -> Vec<String> {
         std::mem::take(&mut lock(&self.shared).told)
     }
@@ -127,14 +130,14 @@ fn lock(shared: &Mutex<Shared>) -> MutexGuard<'_, Shared> {
     shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Goal that the server has accepted, or may have.
+/// Goal that the server has accepted, or may have accepted.
 #[derive(Clone, Copy)]
 struct Goal {
     id: GoalId,
     request: RmwRequestId,
     sent: Instant,
     is_accepted: bool,
-    /// Request of its result.
+    /// Request for its result.
     result: Option<RmwRequestId>,
 }
 
@@ -149,25 +152,25 @@ enum Answer {
 struct Cancellation {
     /// First request that was sent.
     first: Option<RmwRequestId>,
-    /// Time of the last request, and of the first one.
+    /// Times of the last request and of the first one.
     sent: Instant,
     since: Instant,
-    /// True if the wish has to end before the next goal.
+    /// True if the conditions have to end before the next goal.
     holds: bool,
 }
 
 /// Progress of a goal.
 #[derive(Clone, Copy)]
 enum Phase {
-    /// There is none.
+    /// No goal.
     Idle,
-    /// A goal ended against the wish, which has to end before the next one.
+    /// A goal ended unexpectedly; the conditions have to end before the next one.
     Held,
-    /// It is sent.
+    /// The goal was sent.
     Asking { goal: Goal },
-    /// It is accepted.
+    /// The goal was accepted.
     Following { goal: Goal, heard: Instant },
-    /// It is being cancelled.
+    /// The goal is being cancelled.
     Cancelling { goal: Goal, cancellation: Cancellation },
 }
 
@@ -206,7 +209,7 @@ where
         }
     }
 
-    /// Returns the reason for which the server must not follow, if there is one.
+    /// Returns the reason why the server must not follow, if there is one.
     fn wish(&self) -> Result<(), &'static str> {
         let permission = self.switch.permission();
         if !permission.is_granted() {
@@ -234,7 +237,7 @@ where
         let mut shared = lock(&self.shared);
         if is_unconfirmed && !shared.report.is_unconfirmed {
             shared.told.push(
-                "Nav2 does not confirm that it ends the goal: the robot may drive on; stop it by its \
+                "Nav2 does not confirm that it ends the goal: the robot may still drive; use its \
                  emergency stop"
                     .to_owned(),
             );
@@ -262,7 +265,7 @@ where
     }
 
     fn ask(&self) -> Phase {
-        // Feedback of an earlier goal is of no use, and none of it may wait.
+        // Feedback of an earlier goal is useless, but must not stay in the queue.
         while let Ok(Some(_)) = self.client.feedback_subscription().take() {}
         let goal = FollowGoal::of_topic(&self.pose_topic);
         match self.client.send_goal(goal) {
@@ -286,7 +289,7 @@ where
         }
         match wish {
             Err(cause) => self.cancel(goal, cause, false),
-            // It may be accepted later.
+            // The goal may still be accepted later.
             Ok(()) if goal.sent.elapsed() > ACCEPT => {
                 self.cancel(goal, "Nav2 does not answer", true)
             }
@@ -294,9 +297,9 @@ where
         }
     }
 
-    /// Returns the answer of the server to a goal, if it has come.
+    /// Returns the answer of the server to a goal, if it has arrived.
     fn answer(&self, goal: Goal) -> Option<Answer> {
-        // An answer that does not decode is none.
+        // An answer that cannot be decoded counts as none.
         let response = self.client.receive_goal_response(goal.request).ok()??;
         if !response.accepted {
             return Some(Answer::Refused);
@@ -307,7 +310,7 @@ where
 
     fn follow(&self, goal: Goal, heard: Instant, wish: Result<(), &'static str>) -> Phase {
         let mut heard = heard;
-        // A goal that was preempted or whose server is gone sends none.
+        // The server sends none for a goal that was preempted, or when the server is gone.
         while let Ok(Some(feedback)) = self.client.receive_feedback(goal.id) {
             heard = Instant::now();
             self.note(&feedback);
@@ -324,7 +327,7 @@ where
         }
     }
 
-    /// Returns how the goal ended, if it has.
+    /// Returns how the goal ended, if it has ended.
     fn ended(&self, goal: Goal) -> Option<String> {
         let (status, result) = self.client.receive_result(goal.result?).ok()??;
         let outcome: Outcome = result.into();
@@ -377,19 +380,19 @@ where
         Phase::Cancelling { goal, cancellation }
     }
 
-    /// Returns true if a request to cancel the goal, the first or a later one, was answered so that
-    /// the goal does not go on.
+    /// Returns true if a request to cancel the goal, the first or a later one, was answered such
+    /// that the goal ends.
     fn is_cancelled(&self, goal: Goal, first: Option<RmwRequestId>) -> bool {
         let Some(first) = first else { return false };
         while let Ok(Some((request, response))) = self.client.cancel_client().receive_response() {
             let is_ours = request.writer_gid == first.writer_gid
                 && request.sequence_number >= first.sequence_number;
             let ends = match response.return_code as i8 {
-                // Refused.
+                // Rejected.
                 1 => false,
-                // Unknown: a goal without an answer may still be on its way.
+                // Unknown goal: a goal without an answer may still be on its way.
                 2 => goal.is_accepted || goal.sent.elapsed() > ACCEPT,
-                // Cancelled, or it has ended before.
+                // Cancelled, or already ended.
                 _ => true,
             };
             if is_ours && ends {
@@ -419,8 +422,8 @@ where
     fn hold(&self, sentence: String) -> Phase {
         lock(&self.shared).report.reason = Some(sentence.clone());
         self.tell(format!(
-            "{sentence}; the next goal comes when the enable is released and pressed, or when the \
-             person is found again"
+            "{sentence}; the next goal is sent when the enable is released and pressed, or when \
+             the person is found again"
         ));
         Phase::Held
     }

@@ -30,12 +30,12 @@ use crate::raw::RawAdapter;
 use crate::stamps::StampClock;
 use crate::{BridgeError, threads};
 
-/// Number of answers of a service that are kept for callers that missed them.
+/// Number of service answers that are kept for callers that missed them.
 const ANSWERS: usize = 10;
 /// Number of events that are kept for subscribers that missed them.
 const EVENTS: usize = 16;
 
-/// Types of the topics that each node has, this one among them: none of them is of a robot.
+/// Types of the topics that every node has, including this one; they do not belong to a robot.
 const OF_EVERY_NODE: [&str; 4] = [
     "builtin_interfaces/msg/Time",
     "lifecycle_msgs/msg/TransitionEvent",
@@ -50,7 +50,7 @@ pub(crate) struct Network {
     spinner: Option<JoinHandle<()>>,
 }
 
-/// A subscription, which ends when it is dropped.
+/// A subscription that ends when it is dropped.
 pub(crate) struct Ear {
     topic: String,
     abort: AbortHandle,
@@ -78,26 +78,26 @@ fn failed(error: impl std::fmt::Debug) -> BridgeError {
     BridgeError::Network(format!("{error:?}"))
 }
 
-/// Returns the profile of sensors: the newest messages only, without repetition, which is
-/// compatible with all publishers.
+/// Returns the sensor profile: only the newest messages, best effort, which is compatible with all
+/// publishers.
 fn sensor(depth: usize) -> QosProfile {
     QosProfile::subscription_default()
         .reliability_best_effort()
         .history(History::KeepLast { depth })
 }
 
-/// Returns a profile that also receives messages sent before the subscription.
+/// Returns a profile that also receives messages that were sent before the subscription.
 fn latched() -> QosProfile {
     sensor(OTHERS).reliability_reliable(WhenFull::DEFAULT).durability(Durability::TransientLocal)
 }
 
-/// Returns the profile of the topics that let the robot move and stop it: all messages arrive, and
-/// none that was sent before the subscription.
+/// Returns the profile of the topics that enable and stop the robot: all messages arrive, except
+/// those that were sent before the subscription.
 fn commands() -> QosProfile {
     sensor(OTHERS).reliability_reliable(WhenFull::DEFAULT)
 }
 
-/// Returns a profile in which all messages arrive, and publishing does not wait.
+/// Returns a profile in which all messages arrive, but publishing does not block.
 fn reliable() -> QosProfile {
     QosProfile::publisher_default()
         .reliability_reliable(WhenFull::Fail)
@@ -118,7 +118,7 @@ impl Network {
         Ok(Self { node, context, spinner: Some(spinner) })
     }
 
-    /// Returns all discovered topics that a robot may have, with their message types.
+    /// Returns all discovered topics that may belong to a robot, with their message types.
     pub(crate) fn topics(&self) -> Vec<(String, String)> {
         let found = self.context.discovered_topics();
         let named = found.iter().filter_map(|topic| {
@@ -127,7 +127,7 @@ impl Network {
         named.filter(|(_, kind)| !OF_EVERY_NODE.contains(&kind.as_str())).collect()
     }
 
-    /// Puts the messages of a topic into the inbox; returns `None` for a type without use.
+    /// Puts the messages of a topic into the inbox; returns `None` for a type that is not used.
     pub(crate) fn listen(
         &mut self,
         topic: &str,
@@ -148,14 +148,14 @@ impl Network {
             "ffmpeg_image_transport_msgs/msg/FFMPEGPacket" => {
                 self.frames::<OwnedFfmpegPacket>(topic, message_type, OTHERS, inbox, clock)
             }
-            // As large as an image.
+            // As large as images.
             "sensor_msgs/msg/PointCloud2" => {
                 self.frames::<OwnedPointCloud>(topic, message_type, IMAGES, inbox, clock)
             }
             CameraInfo::TYPE => self.plain::<CameraInfo>(topic, sensor(OTHERS), inbox),
             Odometry::TYPE => self.plain::<Odometry>(topic, sensor(OTHERS), inbox),
             LaserScan::TYPE => self.frames::<LaserScan>(topic, message_type, OTHERS, inbox, clock),
-            // Static transforms are sent once, usually before the bridge joins.
+            // Static transforms are sent once, usually before the bridge joins the network.
             TFMessage::TYPE if topic.ends_with("tf_static") => {
                 self.plain::<TFMessage>(topic, latched(), inbox)
             }
@@ -167,8 +167,8 @@ impl Network {
         ear.map(Some)
     }
 
-    /// Puts the messages of a topic of any type into the inbox, as they lie on the wire: those of
-    /// bumpers and range sensors, of which bases have types of their own.
+    /// Puts the messages of a topic of any type into the inbox in serialised form: those of bumpers
+    /// and range sensors, for which bases have their own types.
     pub(crate) fn listen_raw(
         &mut self,
         topic: &str,
@@ -188,7 +188,7 @@ impl Network {
         let inbox = Arc::clone(inbox);
         let name = topic.to_owned();
         let thread = threads::start("a topic", move || {
-            // The reader lives as long as its subscriber.
+            // The reader lives only as long as its subscriber.
             let _subscriber = subscriber;
             let put = reader.as_async_stream().for_each(|message| {
                 match message {
@@ -197,15 +197,15 @@ impl Network {
                 }
                 ready(())
             });
-            // The stream ends by being aborted.
+            // The stream ends when it is aborted.
             let _aborted = block_on(Abortable::new(put, registration));
         })?;
         Ok(Ear::new(topic, abort, thread))
     }
 
-    /// Calls `on` for each message of the enable topic, in a thread of its own that waits for no
-    /// frame: with the origin of a true, and with `None` for a false and for a message that cannot be
-    /// read.
+    /// Calls `on` for each message of the enable topic, in a thread that waits for no frame: with
+    /// the origin of a message that is true, and with `None` for one that is false or cannot be
+    /// decoded.
     pub(crate) fn listen_to_enable(
         &mut self,
         topic: &str,
@@ -223,7 +223,7 @@ impl Network {
         })
     }
 
-    /// Calls `on` for each message of the topic that resets.
+    /// Calls `on` for each message of the reset topic.
     pub(crate) fn listen_to_reset(
         &mut self,
         topic: &str,
@@ -238,8 +238,8 @@ impl Network {
         })
     }
 
-    /// Calls `on` for each message of the topic of speed limits. A message that cannot be read changes
-    /// nothing.
+    /// Calls `on` for each message of the speed limit topic. A message that cannot be decoded has
+    /// no effect.
     pub(crate) fn listen_to_speed_limit(
         &mut self,
         topic: &str,
@@ -257,10 +257,10 @@ impl Network {
         })
     }
 
-    /// Returns the numbers of other participants' publishers on some topics.
+    /// Returns the numbers of publishers of other participants on some topics.
     pub(crate) fn others_on<const N: usize>(&self, topics: [&str; N]) -> [usize; N] {
         let participant = self.context.domain_participant();
-        // Our own publishers may be among those that are discovered.
+        // Our own publishers may be among the discovered ones.
         let ours = participant.guid().prefix;
         let writers = participant.discovered_writers();
         topics.map(|topic| {
@@ -273,7 +273,7 @@ impl Network {
         })
     }
 
-    /// Returns the package of the type of an action, if a server of it is on the network.
+    /// Returns the package of the action's type, if a server for the action is on the network.
     pub(crate) fn action_package(&self, action: &str) -> Option<String> {
         let feedback = format!("rt{}/_action/feedback", full_name(self.node.namespace(), action));
         let writers = self.context.domain_participant().discovered_writers();
@@ -316,8 +316,8 @@ impl Network {
         full_name(self.node.namespace(), topic)
     }
 
-    /// Puts messages of which frames can be made into the inbox: images, and the scans and points of a
-    /// pipeline without a camera. Their stamps set the clock.
+    /// Puts messages from which frames can be made into the inbox: images, and the scans and points
+    /// of a pipeline without a camera. Their stamps set the clock.
     fn frames<M: FrameMessage>(
         &mut self,
         topic: &str,
@@ -342,8 +342,8 @@ impl Network {
         self.ear(topic, M::TYPE, qos, inbox, |message: M| (encode(&message), OTHERS))
     }
 
-    /// Puts the messages of a topic into the inbox. `encode` returns the bytes of one, and the number of
-    /// messages of its topic that may wait.
+    /// Puts the messages of a topic into the inbox. `encode` returns the bytes of a message, and
+    /// the maximum number of messages of its topic that wait.
     fn ear<M: DeserializeOwned + Send + 'static>(
         &mut self,
         topic: &str,
@@ -356,7 +356,7 @@ impl Network {
         let name = topic.to_owned();
         let ours = participant_of(Gid::from(self.context.domain_participant().guid()));
         self.hear(topic, message_type, qos, move |message| match message {
-            // The transforms that this node publishes itself are no input.
+            // The transforms that this node publishes are not an input.
             Some((_, info)) if participant_of(info.publisher_gid()) == ours => {}
             Some((message, _)) => {
                 let (bytes, room) = encode(message);
@@ -366,8 +366,8 @@ impl Network {
         })
     }
 
-    /// Calls `take` for each message of a topic in a thread of its own, with `None` for one that does
-    /// not decode.
+    /// Calls `take` for each message of a topic in a separate thread, with `None` for one that
+    /// cannot be decoded.
     fn hear<M: DeserializeOwned + Send + 'static>(
         &mut self,
         topic: &str,
@@ -382,12 +382,12 @@ impl Network {
             node.create_subscription(&handle, Some(qos)).map_err(failed)?;
         let (abort, registration) = AbortHandle::new_pair();
         let thread = threads::start("a topic", move || {
-            // A message that does not decode is of another type than its topic states.
+            // A message that cannot be decoded has another type than its topic states.
             let put = subscription.async_stream().for_each(|message| {
                 take(message.ok());
                 ready(())
             });
-            // The stream ends by being aborted.
+            // The stream ends when it is aborted.
             let _aborted = block_on(Abortable::new(put, registration));
         })?;
         Ok(Ear::new(topic, abort, thread))
@@ -419,7 +419,7 @@ impl Network {
         self.publisher_of(topic, M::TYPE)
     }
 
-    /// Creates a publisher of a type that logs do not have.
+    /// Creates a publisher of a type that does not occur in logs.
     pub(crate) fn publisher_of<M: Serialize>(
         &mut self,
         topic: &str,
@@ -428,7 +428,7 @@ impl Network {
         self.publisher_with(topic, message_type, reliable())
     }
 
-    /// Creates a publisher whose last message also reaches late subscribers, as maps are published.
+    /// Creates a publisher whose last message also reaches late subscribers, as for maps.
     pub(crate) fn kept_publisher<M: Serialize>(
         &mut self,
         topic: &str,
@@ -437,7 +437,7 @@ impl Network {
         self.publisher_with(topic, message_type, reliable().durability(Durability::TransientLocal))
     }
 
-    /// Creates a publisher of messages that come in a row, of which none may be missed.
+    /// Creates a publisher of a sequence of messages of which none may be missed.
     pub(crate) fn event_publisher<M: Serialize>(
         &mut self,
         topic: &str,
@@ -460,13 +460,13 @@ impl Network {
     }
 }
 
-/// Returns the part of an identity that all publishers of a participant share.
+/// Returns the part of a GID that all publishers of a participant share.
 fn participant_of(publisher: Gid) -> Vec<u8> {
     publisher.to_bytes16()[..12].to_vec()
 }
 
-/// Returns the name of a topic, which lies in the namespace unless it begins with a slash.
-/// (ros2-client by itself doubles the slash in the namespace `/`.)
+/// Returns the name of a topic, which is in the namespace unless it begins with a slash.
+/// (ros2-client itself doubles the slash in the namespace `/`.)
 fn name(namespace: &str, topic: &str) -> Result<Name, BridgeError> {
     let full = full_name(namespace, topic);
     Name::parse(&full).map_err(|error| BridgeError::Config(format!("topic `{topic}`: {error:?}")))

@@ -21,7 +21,7 @@ use crate::{BridgeError, ClockSource, ForecastFrame, Middleware};
     version,
     after_help = "Examples:
   tagalong-ros2 depth-ekf
-        tracks people, moves nothing (the config has no controller)
+        tracks people without commands (the config has no controller)
   tagalong-ros2 my-robot.toml --namespace /robot1 --domain 7
         follows a person; commands go to /robot1/cmd_vel
   tagalong-ros2 my-robot.toml --command cmd_vel_nav
@@ -152,7 +152,7 @@ pub struct Options {
     pub lifecycle: bool,
 }
 
-/// The variable that names a Discovery Server of Fast DDS.
+/// The environment variable that names a Discovery Server of Fast DDS.
 const DISCOVERY_SERVER: &str = "ROS_DISCOVERY_SERVER";
 
 /// Type of the command messages.
@@ -222,7 +222,7 @@ impl Options {
         Ok(Setup { pipeline, robot, input: self.named(input), limits })
     }
 
-    /// Checks the config, and returns what follows from it, in lines.
+    /// Checks the config, and returns the values that follow from it, as lines of text.
     ///
     /// # Errors
     /// [`BridgeError::Config`], with file, line and remedy.
@@ -247,7 +247,7 @@ impl Options {
         }
     }
 
-    /// Returns the settings with the topics of the command line.
+    /// Returns the settings with the topics from the command line.
     fn named(&self, input: InputSettings) -> InputSettings {
         InputSettings {
             colour_topic: self.colour.clone().or(input.colour_topic),
@@ -258,28 +258,29 @@ impl Options {
     }
 }
 
-/// Refuses to talk openly where the environment enforces the security of ROS 2: this node has none.
+/// Refuses unencrypted communication if the environment enforces ROS 2 security, which this node
+/// does not have.
 fn check_security(variable: impl Fn(&str) -> Option<String>) -> Result<(), BridgeError> {
     let is_enabled = variable("ROS_SECURITY_ENABLE").as_deref() == Some("true");
     if is_enabled && variable("ROS_SECURITY_STRATEGY").as_deref() == Some("Enforce") {
-        let words = "ROS_SECURITY_STRATEGY is Enforce, and this program has no DDS security; its README \
-                     says why, under Security";
+        let words = "ROS_SECURITY_STRATEGY is Enforce, but this program has no DDS security; its \
+                     README says why, under Security";
         return Err(BridgeError::Config(words.to_owned()));
     }
     Ok(())
 }
 
-/// Refuses to start where nodes find each other through a Discovery Server of Fast DDS: this node does
-/// not ask one, and would see no topic.
+/// Refuses to start if nodes find each other through a Discovery Server of Fast DDS: this node does
+/// not use one, and would see no topics.
 fn check_discovery(variable: impl Fn(&str) -> Option<String>) -> Result<(), BridgeError> {
     let server = variable(DISCOVERY_SERVER).unwrap_or_default();
     if server.is_empty() {
         return Ok(());
     }
     let words = format!(
-        "{DISCOVERY_SERVER} is `{server}`, and this program knows Simple Discovery alone: it would see no \
-         topic. Set the robot to Simple Discovery (on a TurtleBot 4 in `turtlebot4-setup`), restart its \
-         nodes, and unset {DISCOVERY_SERVER} for this program"
+        "{DISCOVERY_SERVER} is `{server}`, but this program supports Simple Discovery only, so it \
+         would see no topic. Set the robot to Simple Discovery (on a TurtleBot 4 in \
+         `turtlebot4-setup`), restart its nodes, and unset {DISCOVERY_SERVER} for this program"
     );
     Err(BridgeError::Config(words))
 }

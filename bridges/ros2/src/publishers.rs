@@ -1,9 +1,9 @@
-//! Gate of a topic that lets the robot move: one publisher, and only messages that are young by the
-//! clock of their publisher.
+//! Gate of a topic that lets the robot move: it accepts a single publisher, and only messages that
+//! are recent by the clock of their publisher.
 //!
-//! Two programs at one switch cannot stop each other: where a hand lets go, the other program drives
-//! on. A message that waited on its way, in a queue or on a network that was gone, says nothing about
-//! the hand now.
+//! With two programs on one enable topic, neither could stop the robot: if the operator of one lets
+//! go, the other program keeps it moving. A message that was delayed, in a queue or by a network
+//! outage, shows nothing about the operator's hand now.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -16,8 +16,8 @@ use tagalong::core::Stamp;
 pub(crate) struct Origin {
     /// Identity of the publisher.
     pub(crate) publisher: Gid,
-    /// Time at which the message was published, by the clock of its machine; `None` if the middleware
-    /// does not tell it, and the message counts by its arrival.
+    /// Time at which the message was published, by the clock of its machine; `None` if the
+    /// middleware does not report it, and the time of arrival counts.
     pub(crate) published: Option<Stamp>,
 }
 
@@ -28,13 +28,13 @@ impl From<&MessageInfo> for Origin {
     }
 }
 
-/// Cause for which a message does not count.
+/// Reason why a message does not count.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Unfit {
     /// The topic has more than one publisher.
     Contested,
-    /// The message is this old by the clock of its publisher, s; ahead of this machine's clock if
-    /// negative.
+    /// Age of the message by the clock of its publisher, s; negative if that clock is ahead of this
+    /// machine's.
     Untimely(f64),
 }
 
@@ -47,24 +47,24 @@ pub(crate) struct Gate {
 
 #[derive(Debug, Default)]
 struct State {
-    /// Publishers that discovery knows.
+    /// Number of discovered publishers.
     discovered: usize,
-    /// Publisher of the last message, with its arrival.
+    /// Publisher of the last message, with its time of arrival.
     last: Option<(Gid, Instant)>,
     untimely: u64,
-    /// Age of the first untimely message that was not told yet, s.
+    /// Age of the first untimely message that was not reported yet, s.
     untold_s: Option<f64>,
-    /// True while the last message was untimely.
+    /// True if the last message was untimely.
     is_untimely: bool,
 }
 
 impl Gate {
-    /// Creates a gate for messages that count for `lifespan` from their publication.
+    /// Creates a gate for messages that count for `lifespan` after their publication.
     pub(crate) fn new(lifespan: Duration) -> Self {
         Self { lifespan, state: Mutex::default() }
     }
 
-    /// Returns the age of a message that counts; `now` and `clock` are the time of its arrival.
+    /// Returns the age of a message that counts; `now` and `clock` are its time of arrival.
     ///
     /// # Errors
     /// [`Unfit`] for a message that does not count.
@@ -84,7 +84,7 @@ impl Gate {
         }
         let age_s = origin.published.map_or(0.0, |published| clock.seconds_since(published));
         let lifespan_s = self.lifespan.as_secs_f64();
-        // Ahead by more than that, nothing is known about the true age.
+        // If it is ahead by more than that, nothing is known about its true age.
         if !(-lifespan_s..=lifespan_s).contains(&age_s) {
             if !state.is_untimely {
                 state.untold_s = Some(age_s);
@@ -97,22 +97,22 @@ impl Gate {
         Ok(Duration::from_secs_f64(age_s.max(0.0)))
     }
 
-    /// Sets the number of publishers that discovery knows.
+    /// Sets the number of discovered publishers.
     pub(crate) fn set_discovered(&self, publishers: usize) {
         self.lock().discovered = publishers;
     }
 
-    /// Returns the number of publishers that discovery knows.
+    /// Returns the number of discovered publishers.
     pub(crate) fn discovered(&self) -> usize {
         self.lock().discovered
     }
 
-    /// Returns the number of messages that did not count for their age.
+    /// Returns the number of messages that were ignored because of their age.
     pub(crate) fn untimely(&self) -> u64 {
         self.lock().untimely
     }
 
-    /// Returns the age of an untimely message, s, once for each row of them.
+    /// Returns the age of an untimely message, s, once for each series of them.
     pub(crate) fn take_untold(&self) -> Option<f64> {
         self.lock().untold_s.take()
     }

@@ -1,11 +1,11 @@
-//! Messages as they lie on the wire, for types that only the log reader knows.
+//! Messages in serialised form, for types that only the log reader knows.
 
 use std::convert::Infallible;
 
 use ros2_client::dds::rustdds::RepresentationIdentifier;
 use ros2_client::dds::rustdds::no_key::{Decode, DefaultDecoder, DeserializerAdapter};
 
-/// Adapter of a DDS reader that hands messages on without a look into them.
+/// Adapter of a DDS reader that passes messages on without decoding them.
 pub(crate) struct RawAdapter;
 
 /// Decoder of [`RawAdapter`].
@@ -33,7 +33,7 @@ impl DefaultDecoder<Vec<u8>> for RawAdapter {
 impl<'de> Decode<'de, Vec<u8>> for RawDecoder {
     type Error = Infallible;
 
-    /// Returns the message with its encapsulation header, which DDS takes off.
+    /// Returns the message with its encapsulation header, which DDS removes.
     fn decode_bytes(
         self,
         message: &'de [u8],

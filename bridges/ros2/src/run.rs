@@ -1,4 +1,4 @@
-//! A run of the node: the states of its life, and the bridge while it is active.
+//! A run of the node: its lifecycle states, and the bridge while it is active.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -37,7 +37,7 @@ pub fn run(
     run_with(options, &registry, stop, tell)
 }
 
-/// Runs the bridge as [`run`], with these plugins.
+/// Runs the bridge as [`run`] does, with these plugins.
 ///
 /// # Errors
 /// [`BridgeError`]. The robot is told to stop in any case.
@@ -47,12 +47,12 @@ pub fn run_with(
     stop: &AtomicBool,
     tell: &dyn Fn(&str),
 ) -> Result<Summary, BridgeError> {
-    // Before all else, so that an error in the config ends the program at once.
+    // Done first, so that an error in the config ends the program at once.
     let setup = options.setup(registry)?;
-    // Before the network, so that a port that is taken ends the program at once.
+    // Before the network, so that a port that is in use ends the program at once.
     let live = options.serve.map(|at| serve(at, options, &setup, registry, tell)).transpose()?;
     let (desk, requests) = Desk::new();
-    // Before the topics are there, so that a supervisor can ask how the bridge is.
+    // Before the topics are there, so that a supervisor can query the state of the bridge.
     let http = options.http.map(|address| HttpServer::start(address, desk.clone())).transpose()?;
     if let Some(http) = &http {
         tell(&format!("answers at {}", http.address()));
@@ -87,7 +87,7 @@ pub fn run_with(
     ended.map(|()| summary)
 }
 
-/// Begins to serve the page of what happens now.
+/// Starts serving the live page.
 fn serve(
     at: SocketAddr,
     options: &Options,
@@ -101,21 +101,21 @@ fn serve(
     let live = Live::start(at, &name, &input, config, registry);
     let live = live.map_err(|error| BridgeError::Serve(at, error))?;
     tell(&format!(
-        "live: open {} in a browser; whoever has this address sees the page",
+        "live: open {} in a browser; anyone with this address sees the page",
         live.address()
     ));
     Ok(live)
 }
 
-/// Parts of the node in its state.
+/// Parts of the node that exist in its present state.
 enum Body {
-    /// Nothing but its place on the network.
+    /// Only the connection to the network.
     Bare(Surroundings),
-    /// A pipeline, whose inputs are not waited for yet, or not there yet.
+    /// A pipeline whose inputs are not there yet, or are not waited for yet.
     Configured(Surroundings, Box<Setup>),
-    /// A bridge with what it listens to.
+    /// A bridge with its subscriptions.
     Working(Box<Bridge>, Vec<Ear>),
-    /// Between two others, and after a failure to leave one.
+    /// Placeholder between two states, and after a failure to leave one.
     Gone,
 }
 
@@ -128,13 +128,13 @@ struct Node<'a> {
     lifecycle: Lifecycle,
     desk: Desk,
     body: Body,
-    /// Config that was checked before the node joined the network, for its first use.
+    /// Config that was checked before the node joined the network, for the first use.
     checked: Option<Setup>,
     summary: Summary,
 }
 
 impl Node<'_> {
-    /// Passes through the states until the end of the program.
+    /// Passes through the states until the program ends.
     fn live(&mut self) -> Result<(), BridgeError> {
         if self.options.lifecycle {
             self.show_state();
@@ -155,9 +155,9 @@ impl Node<'_> {
         Ok(())
     }
 
-    /// Carries out a transition for which a caller asked.
+    /// Carries out a transition that a caller requested.
     fn carry_out(&mut self, order: Order) {
-        // The state may have changed by an error since.
+        // The state may have changed in the meantime because of an error.
         let is_current = order.transition.start == self.lifecycle.state();
         let success = is_current && self.pass(order.transition) == Ending::Success;
         order.answer(success);
@@ -181,14 +181,14 @@ impl Node<'_> {
         };
         let state = self.lifecycle.end(ending);
         self.show_state();
-        // A node that manages itself says what it does, not that it may.
+        // A node that manages itself reports what it does, but not that it may be activated.
         if self.options.lifecycle || ![INACTIVE, ACTIVE].contains(&state) {
             (self.tell)(&format!("{}: {}", transition.label, state.label));
         }
         ending
     }
 
-    /// Lets callers know the state; requests are refused until the bridge works.
+    /// Publishes the state for callers; requests are rejected until the bridge works.
     fn show_state(&self) {
         self.desk.close(self.lifecycle.state().label);
     }
@@ -216,7 +216,7 @@ impl Node<'_> {
         Ending::Success
     }
 
-    /// Stops the robot; the bridge stays.
+    /// Stops the robot; the bridge is kept.
     fn rest(&mut self) {
         if let Body::Working(bridge, _) = &mut self.body {
             bridge.rest();
@@ -265,8 +265,7 @@ impl Node<'_> {
         }
     }
 
-    /// Stops the robot after an error: a node that a manager leads is unconfigured then, another one
-    /// ends with it.
+    /// Stops the robot after an error: a managed node is then unconfigured, another node ends.
     fn fail(&mut self, error: BridgeError) -> Result<(), BridgeError> {
         self.lifecycle.begin(DEACTIVATE);
         self.lifecycle.end(Ending::Error);
@@ -286,7 +285,7 @@ impl Node<'_> {
         Ok(())
     }
 
-    /// Ends the life of the node.
+    /// Shuts the node down.
     fn shut_down(&mut self) {
         if let Some(transition) = self.lifecycle.state().shutdown() {
             self.lifecycle.begin(transition);

@@ -1,4 +1,4 @@
-//! The verbs of the skill as ROS 2 services of standard types.
+//! The requests of callers as ROS 2 services of standard types.
 
 use futures::StreamExt;
 use futures::executor::block_on;
@@ -14,8 +14,8 @@ use crate::network::{Ear, Network};
 use crate::skill::{Desk, Refusal, Verb};
 use crate::{BridgeError, threads};
 
-/// Middleware of the ROS 2 nodes that call the services: each carries the number of a request in its
-/// own way.
+/// Middleware of the ROS 2 nodes that call the services, because each transmits the sequence number
+/// of a request in its own way.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Middleware {
     /// Fast DDS, which is the default of ROS 2.
@@ -36,7 +36,7 @@ impl Middleware {
     }
 }
 
-/// Request of `std_srvs/Trigger`, which has one byte on the wire.
+/// Request of `std_srvs/Trigger`, which is one byte in DDS.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct TriggerRequest {
     structure_needs_at_least_one_member: u8,
@@ -95,7 +95,7 @@ pub(crate) fn offer(
     Ok(all)
 }
 
-/// Answers the requests of a service in a thread of its own.
+/// Answers the requests of a service in a separate thread.
 pub(crate) fn serve<Q, A>(
     name: &str,
     server: Server<Q, A>,
@@ -108,13 +108,13 @@ where
     let (abort, registration) = AbortHandle::new_pair();
     let thread = threads::start("a service", move || {
         let served = server.receive_request_stream().for_each(|request| {
-            // A request that does not decode has no number to answer to.
+            // A request that cannot be decoded has no sequence number to answer.
             if let Ok((id, request)) = request {
                 let _lost = server.send_response(id, answer(request));
             }
             ready(())
         });
-        // The stream ends by being aborted.
+        // The stream ends when it is aborted.
         let _aborted = block_on(Abortable::new(served, registration));
     })?;
     Ok(Ear::new(name, abort, thread))
@@ -130,7 +130,7 @@ fn status(desk: &Desk) -> TriggerResponse {
     }
 }
 
-/// Enrolls by parameters; the result is the same for each of them.
+/// Enrolls according to the parameters; the result is the same for each of them.
 fn enroll(desk: &Desk, request: &SetParametersRequest) -> SetParametersResponse {
     let answer = match enrollment(&request.parameter) {
         Ok(enrollment) => desk.ask(Verb::Enroll(enrollment)),
@@ -189,7 +189,7 @@ fn enrollment(parameters: &[Parameter]) -> Result<Enrollment, String> {
     Ok(Enrollment { person, ..patience })
 }
 
-/// Returns the refusal of a parameter that has a value of another kind.
+/// Returns the rejection of a parameter whose value has another type.
 fn wrong_value(name: &str, wanted: &str) -> String {
     format!("`{name}` must be {wanted}")
 }

@@ -1,8 +1,8 @@
 //! Desk at which callers leave their requests: enroll, clear, status, health.
 //!
-//! Services and HTTP have threads of their own; the pipeline belongs to another one, which takes a
-//! request between two frames. A status is a copy of that after the last frame, so that it comes also
-//! while a frame takes long.
+//! Services and HTTP have their own threads; the pipeline belongs to another thread, which takes a
+//! request between two frames. A status is a copy of that after the last frame, so that it is
+//! available even while a frame takes long.
 
 use std::fmt;
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
@@ -14,19 +14,19 @@ use tagalong::pipeline::{Enrollment, FollowStatus, Permission};
 
 use crate::nav2::GoalReport;
 
-/// Longest wait for an answer of the pipeline.
+/// Maximum time to wait for an answer of the pipeline.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// Requests that wait; more are refused.
+/// Maximum number of waiting requests; further ones are rejected.
 const WAITING: usize = 16;
-/// Time without a frame from which on the bridge is not well.
+/// Time without a frame from which on the bridge is unhealthy.
 const SILENCE: Duration = Duration::from_secs(2);
-/// Time in one frame from which on the pipeline is stuck.
+/// Time in one frame from which on the pipeline counts as stuck.
 pub(crate) const STUCK: Duration = Duration::from_millis(500);
 
-/// Refusal while the node is not active, and cause of its latch.
+/// Rejection while the node is not active, and reason for its latch.
 pub(crate) const NOT_ACTIVE: &str = "the node is not active";
 
-/// Change that a caller asks for.
+/// Change that a caller requests.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Verb {
     /// Follow the person of this request.
@@ -44,16 +44,16 @@ impl fmt::Display for Verb {
     }
 }
 
-/// Verb with the channel of its answer, which is a refusal in words.
+/// Request with the channel for its answer, which is a rejection in words or success.
 pub(crate) struct Request {
     pub(crate) verb: Verb,
     pub(crate) answer: SyncSender<Result<(), String>>,
 }
 
-/// Refusal of a request.
+/// Rejection of a request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Refusal {
-    /// The pipeline refuses it, for this reason.
+    /// The pipeline rejects it, for this reason.
     Refused(String),
     /// The pipeline did not answer in time.
     Busy(&'static str),
@@ -72,12 +72,12 @@ impl Refusal {
 /// State of the bridge for a caller.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct BridgeStatus {
-    /// State of the pursuit; null without a controller or before the first frame.
+    /// State of following; null without a controller or before the first frame.
     #[serde(flatten)]
     pub(crate) follow: Option<FollowStatus>,
     /// Permission of the deadman's switch to move, in words.
     pub(crate) permission: Option<&'static str>,
-    /// Cause that keeps the robot from being enabled, in words: the enable has no publisher.
+    /// Reason why the robot cannot be enabled, in words: the enable has no publisher.
     pub(crate) note: Option<String>,
     /// Frames that the pipeline processed.
     pub(crate) frames: u64,
@@ -92,16 +92,16 @@ pub(crate) struct BridgeStatus {
 /// Health of the bridge.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Health {
-    /// True while frames are processed and no fault holds the robot.
+    /// True while frames are processed and no fault stops the robot.
     pub(crate) ok: bool,
-    /// Cause if not.
+    /// Reason if not.
     pub(crate) reason: Option<String>,
-    /// Cause that keeps the robot from being enabled, in words.
+    /// Reason why the robot cannot be enabled, in words.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) note: Option<String>,
 }
 
-/// The desk; clones are the same one.
+/// The desk; clones share the same state.
 #[derive(Clone)]
 pub(crate) struct Desk {
     requests: SyncSender<Request>,
@@ -115,9 +115,9 @@ struct Shared {
     note: Option<String>,
     frames: u64,
     frame: Option<Instant>,
-    /// End of the last turn of the loop, which takes one frame.
+    /// End of the last iteration of the loop, which processes one frame.
     turn: Option<Instant>,
-    /// True once the pipeline takes requests.
+    /// True once the pipeline accepts requests.
     is_open: bool,
     lifecycle: &'static str,
     nav2: Option<GoalReport>,
@@ -130,14 +130,14 @@ impl Desk {
         (Self { requests, shared: Arc::default() }, waiting)
     }
 
-    /// Lets requests in.
+    /// Accepts requests from now on.
     pub(crate) fn open(&self) {
         self.lock().is_open = true;
     }
 
-    /// Refuses requests, until [`Desk::open`], in this state of the node.
+    /// Rejects requests, until [`Desk::open`], in this state of the node.
     pub(crate) fn close(&self, lifecycle: &'static str) {
-        // Nothing of an earlier time says how the bridge is now.
+        // Earlier data says nothing about the present state of the bridge.
         *self.lock() = Shared { lifecycle, ..Shared::default() };
     }
 
@@ -152,8 +152,8 @@ impl Desk {
         (shared.follow, shared.frames, shared.frame) = (follow, frames, Some(Instant::now()));
     }
 
-    /// Sets the state after a turn of the loop, and after a request; `note` is the cause that keeps the robot
-    /// from being enabled.
+    /// Sets the state after an iteration of the loop, and after a request; `note` is the reason why
+    /// the robot cannot be enabled.
     pub(crate) fn turn(
         &self,
         permission: Option<Permission>,
@@ -172,17 +172,17 @@ impl Desk {
         let shared = self.lock();
         match shared.lifecycle {
             _ if shared.is_open => Ok(()),
-            "" | "active" => Err(Refusal::Busy("the topics of the robot are still waited for")),
+            "" | "active" => Err(Refusal::Busy("still waiting for the topics of the robot")),
             _ => Err(Refusal::Busy(NOT_ACTIVE)),
         }
     }
 
-    /// Hands a verb to the pipeline and waits for its answer.
+    /// Passes a request to the pipeline and waits for its answer.
     pub(crate) fn ask(&self, verb: Verb) -> Result<(), Refusal> {
         self.check_open()?;
         let (answer, answered) = sync_channel(1);
         self.requests.try_send(Request { verb, answer }).map_err(|error| match error {
-            TrySendError::Full(_) => Refusal::Busy("too many requests wait"),
+            TrySendError::Full(_) => Refusal::Busy("too many requests are waiting"),
             TrySendError::Disconnected(_) => Refusal::Busy("the bridge ends"),
         })?;
         match answered.recv_timeout(PATIENCE) {
@@ -205,7 +205,7 @@ impl Desk {
         }
     }
 
-    /// Returns whether the bridge does its work.
+    /// Returns the health of the bridge.
     pub(crate) fn health(&self) -> Health {
         let shared = self.lock();
         let fault = shared.follow.as_ref().and_then(|follow| follow.fault);
@@ -244,7 +244,7 @@ mod tests {
     fn a_request_waits_for_the_pipeline_and_brings_its_answer_back() {
         let (desk, requests) = Desk::new();
         let before = desk.ask(Verb::Clear).unwrap_err();
-        assert_eq!(before.reason(), "the topics of the robot are still waited for");
+        assert_eq!(before.reason(), "still waiting for the topics of the robot");
         desk.open();
         let pipeline = thread::spawn(move || {
             let answers = [Ok(()), Err("no person".to_owned())];
@@ -280,7 +280,7 @@ mod tests {
         assert_eq!((status.permission, status.frames, status.lifecycle), (None, 0, "inactive"));
         desk.close("active");
         let waits = desk.ask(Verb::Clear).unwrap_err();
-        assert_eq!(waits.reason(), "the topics of the robot are still waited for");
+        assert_eq!(waits.reason(), "still waiting for the topics of the robot");
         assert_eq!(desk.health().reason.as_deref(), Some("no frame yet"));
         desk.open();
         desk.frame(None, 2);

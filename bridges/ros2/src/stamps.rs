@@ -4,11 +4,11 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use tagalong::core::Stamp;
 
-/// Number of first arrivals that are remembered: those of a few streams during a frame that takes
+/// Number of first arrivals that are stored: those of a few streams during a frame that takes
 /// seconds.
 const ARRIVALS: usize = 512;
-/// Longest time for which [`ClockSource::Arrival`] goes on after the newest frame; longer than any
-/// command is valid, and short enough that a paused simulation goes on soon after its pause.
+/// Maximum time for which [`ClockSource::Arrival`] continues after the newest frame; longer than
+/// any command is valid, and short enough that a paused simulation resumes soon after its pause.
 const LEAD: Duration = Duration::from_secs(1);
 
 /// Clock for the age of a frame.
@@ -25,8 +25,8 @@ pub enum ClockSource {
 
 /// Current time by the clock of the stamps, which never goes back.
 ///
-/// Only a frame with a newer stamp than all before sets the clock of [`ClockSource::Arrival`]: an image
-/// that is sent again, that is older, or that makes no frame, changes nothing.
+/// Only a frame with a newer stamp than all before sets the clock of [`ClockSource::Arrival`]: an
+/// image that is repeated, that is older, or that makes no frame, has no effect.
 #[derive(Debug)]
 pub(crate) struct StampClock {
     source: ClockSource,
@@ -35,7 +35,7 @@ pub(crate) struct StampClock {
 
 #[derive(Debug, Default)]
 struct State {
-    /// Stamps of images with the times of their first arrival, oldest arrival first.
+    /// Stamps of images with their first times of arrival, oldest arrival first.
     arrivals: VecDeque<(Stamp, Instant)>,
     /// Newest stamp of a frame, with the first arrival of its image.
     frame: Option<(Stamp, Instant)>,
@@ -58,7 +58,7 @@ impl StampClock {
         Self { source, state: Mutex::default() }
     }
 
-    /// Records the arrival of an image. Of images with the same stamp the first counts.
+    /// Records the arrival of an image. Of images with the same stamp, only the first counts.
     pub(crate) fn record_arrival(&self, stamp: Stamp) {
         let mut state = self.lock();
         if state.arrival(stamp).is_none() {
@@ -69,7 +69,7 @@ impl StampClock {
         }
     }
 
-    /// Records that a frame was made of an image; returns its timing.
+    /// Records that a frame was made from an image; returns its timing.
     pub(crate) fn record_frame(&self, stamp: Stamp) -> FrameTiming {
         let mut state = self.lock();
         let arrival = state.arrival(stamp).unwrap_or_else(Instant::now);
@@ -97,7 +97,7 @@ impl StampClock {
 impl State {
     /// Returns the first arrival of an image with this stamp.
     fn arrival(&self, stamp: Stamp) -> Option<Instant> {
-        // The newest are asked for most often.
+        // The newest are queried most often.
         self.arrivals.iter().rev().find(|(known, _)| *known == stamp).map(|(_, at)| *at)
     }
 
@@ -106,7 +106,7 @@ impl State {
             ClockSource::System => system_time(),
             ClockSource::Arrival => self.since_frame(),
         };
-        // A clock that went back would make commands last.
+        // If the clock went back, commands would be valid for longer.
         self.latest = self.latest.max(now);
         self.latest
     }

@@ -39,7 +39,7 @@ impl fmt::Display for Summary {
 }
 
 impl Summary {
-    /// Adds the counts of a later part of the run; those of topics are counted since its beginning.
+    /// Adds the counts of a later part of the run; those of topics are counted from its beginning.
     pub(crate) fn add(&mut self, later: Summary) {
         self.frames += later.frames;
         self.told.commands += later.told.commands;

@@ -4,10 +4,11 @@ use std::thread::{Builder, JoinHandle};
 
 use crate::BridgeError;
 
-/// Starts a thread; `purpose` names it in an error, and for debuggers.
+/// Starts a thread; `purpose` names it in errors and debuggers.
 ///
 /// # Errors
-/// [`BridgeError::Thread`] where no further thread can be started, as beyond the limit of a container.
+/// [`BridgeError::Thread`] if no further thread can be started, for example because of the limit of
+/// a container.
 pub(crate) fn start<T: Send + 'static>(
     purpose: &'static str,
     work: impl FnOnce() -> T + Send + 'static,

@@ -9,15 +9,16 @@ use tagalong::pipeline::{Enable, EnableSwitch, Orders, Permission};
 
 use crate::{BridgeError, threads};
 
-/// Duration of zero commands after the last frame, or the last time with permission to move, s; then
-/// none are sent, so that other nodes may drive (the `stop_pub_timeout` of Nav2).
+/// Time for which zero commands are sent after the last frame, or after the last time with
+/// permission to move, s; then nothing is sent, so that other nodes may drive (the
+/// `stop_pub_timeout` of Nav2).
 const ZEROS_S: f64 = 2.0;
-/// Number of zero commands at the end, and time between them.
+/// Number of zero commands at the end, and the time between them.
 const FAREWELLS: u32 = 5;
 const BETWEEN_FAREWELLS: Duration = Duration::from_millis(10);
 
-/// Sends commands to the wheels at a steady rate, from the last orders; zero when these have
-/// expired or the switch gives no permission, and zero at the end, also after an error.
+/// Sends commands to the wheels at a constant rate, from the last orders; zero when these have
+/// expired or the switch gives no permission, and zero at the end, even after an error.
 pub struct Wheels {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<CommandCounts>>,
@@ -32,7 +33,8 @@ pub struct CommandCounts {
     pub zeros: u64,
 }
 
-/// Access to the switch of the wheels for the threads that hear its topics. It waits for no frame.
+/// Access to the switch of the wheels for the threads that receive its topics. It waits for no
+/// frame.
 #[derive(Clone)]
 pub struct SwitchHandle {
     shared: Arc<Shared>,
@@ -44,11 +46,11 @@ impl SwitchHandle {
         self.shared.started.elapsed()
     }
 
-    /// Takes in an event of the switch that happened at a time, and tells the wheels at once.
+    /// Applies an event of the switch that happened at a time, and notifies the wheels at once.
     pub fn take(&self, event: Enable, at: Duration) {
         let mut state = self.shared.lock();
         state.switch.take(event, at);
-        // An enable is no reason for another command.
+        // An enable does not require another command.
         state.is_new = event != Enable::On;
         self.shared.changed.notify_all();
     }
@@ -58,8 +60,8 @@ impl SwitchHandle {
         self.shared.lock().switch.permission(self.now())
     }
 
-    /// Stops the robot and ends the commands: zeros go out if others did before, then none until
-    /// [`SwitchHandle::resume`]. The switch latches, so that a resume alone moves nothing.
+    /// Stops the robot and ends the commands: zeros are sent if others were before, then nothing
+    /// until [`SwitchHandle::resume`]. The switch latches, so that a resume alone moves nothing.
     pub fn halt(&self, cause: &'static str) {
         let now = self.now();
         let mut state = self.shared.lock();
@@ -68,10 +70,10 @@ impl SwitchHandle {
         self.shared.changed.notify_all();
     }
 
-    /// Lets commands go out again after [`SwitchHandle::halt`].
+    /// Allows commands again after [`SwitchHandle::halt`].
     pub fn resume(&self) {
         let mut state = self.shared.lock();
-        // The orders of a frame that was under way at the halt are old.
+        // The orders of a frame that was being processed at the halt are old.
         *state = State { orders: None, is_active: true, ..*state };
     }
 
@@ -88,12 +90,12 @@ impl SwitchHandle {
 /// Node that drives the robot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Driver {
-    /// This one.
+    /// This node.
     #[default]
     Bridge,
-    /// Another one, as long as the switch gives permission: until then this one says nothing.
+    /// Another node, as long as the switch gives permission: until then this node sends nothing.
     Other,
-    /// Another one that should have stopped and did not confirm it: zeros go on in any case.
+    /// Another node that should have stopped but did not confirm it: zeros are sent in any case.
     Unconfirmed,
 }
 
@@ -114,7 +116,7 @@ struct State {
     frame: Option<Instant>,
     /// True if the orders have not been sent yet.
     is_new: bool,
-    /// False after a halt: no commands.
+    /// False after a halt, when no commands are sent.
     is_active: bool,
     driver: Driver,
     quits: bool,
@@ -141,8 +143,8 @@ impl State {
 }
 
 impl Wheels {
-    /// Starts the thread, with a switch that it obeys. `now` returns the time by the clock of the frames' stamps, `tell` sends
-    /// wheel speeds and must not wait.
+    /// Starts the thread, with a switch that it obeys. `now` returns the time by the clock of the
+    /// frames' stamps, `tell` sends wheel speeds and must not block.
     ///
     /// # Errors
     /// [`BridgeError::Thread`].
@@ -175,7 +177,7 @@ impl Wheels {
         SwitchHandle { shared: Arc::clone(&self.shared) }
     }
 
-    /// Sets the orders that hold until the next frame; `None` is a stop.
+    /// Sets the orders that are valid until the next frame; `None` is a stop.
     pub fn obey(&self, orders: Option<Orders>) {
         let mut state = self.shared.lock();
         *state = State { orders, frame: Some(Instant::now()), is_new: true, ..*state };
@@ -190,7 +192,7 @@ impl Wheels {
     fn quit(&mut self) -> CommandCounts {
         self.shared.lock().quits = true;
         self.shared.changed.notify_all();
-        // Taken, because `finish` drops the value, which quits once more.
+        // Taken out, because `finish` drops the value, which would quit once more.
         let told = self.thread.take().map(JoinHandle::join);
         told.and_then(Result::ok).unwrap_or_default()
     }
@@ -209,7 +211,7 @@ impl CommandCounts {
     }
 }
 
-/// Sends the zeros of an end, several for the case that some are lost.
+/// Sends the zeros at an end, several in case some are lost.
 fn say_farewell(told: &mut CommandCounts, tell: &mut impl FnMut(WheelSpeeds)) {
     for _ in 0..FAREWELLS {
         told.count(WheelSpeeds::STOP);
@@ -230,10 +232,10 @@ impl Shared {
         mut tell: impl FnMut(WheelSpeeds),
     ) -> CommandCounts {
         let mut told = CommandCounts::default();
-        // True if the robot was driven since the last farewell.
+        // True if the robot was driven since the last zeros.
         let mut has_driven = false;
         while let Some(state) = self.wait(period) {
-            // Not while it is halted: the farewell is said once.
+            // Not while it is halted, because the final zeros are sent only once.
             has_driven |= state.is_active && state.driver == Driver::Other;
             if let Some(wheels) = state.command(now(), self.started.elapsed()) {
                 told.count(wheels);
@@ -250,7 +252,7 @@ impl Shared {
         told
     }
 
-    /// Waits for new orders, but no longer than a period; returns `None` at the end.
+    /// Waits for new orders, but at most for one period; returns `None` at the end.
     fn wait(&self, period: Duration) -> Option<State> {
         let waited = self
             .changed

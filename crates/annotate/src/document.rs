@@ -156,7 +156,7 @@ impl Document {
                 check_region(region)?;
                 Ok(vec![check_id(id.unwrap_or_else(|| self.free_id()))?])
             }
-            Change::Head { .. } => Err("the place of a head needs an image".into()),
+            Change::Head { .. } => Err("the position of a head needs an image".into()),
             Change::Number { id, to, .. } => {
                 Ok([self.known_person(*id)?, vec![check_id(*to)?]].concat())
             }
@@ -275,7 +275,7 @@ impl Document {
 
 fn check_id(id: i64) -> Result<i64, String> {
     let is_known = (1..=MOST_ID).contains(&id);
-    if is_known { Ok(id) } else { Err(format!("{id} is no number of a person: 1 to {MOST_ID}")) }
+    if is_known { Ok(id) } else { Err(format!("{id} is not a valid ID: 1 to {MOST_ID}")) }
 }
 
 /// Largest coordinate of a box, pixels.

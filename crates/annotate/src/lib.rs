@@ -130,8 +130,8 @@ pub fn annotate(args: &AnnotateArgs, registry: &Registry) -> Outcome {
     say(&origin);
     let app = app(args, film, people, &output, origin);
     print(&format!(
-        "{}\nopen this address in a browser on this computer; whoever has it may edit\nevery change \
-         is written to {}; Ctrl-C ends\n",
+        "{}\nopen this address in a browser on this computer; anyone with the address can \
+         edit\nevery change is written to {}; Ctrl-C ends\n",
         server.address(),
         output.display()
     ))?;
@@ -139,8 +139,8 @@ pub fn annotate(args: &AnnotateArgs, registry: &Registry) -> Outcome {
     if !app.finished.load(Ordering::Relaxed) {
         if !output.exists() {
             say(&format!(
-                "nothing was changed, so {} is not written; `Finish` in the page takes the proposed \
-                 boxes as they are",
+                "nothing was changed, so {} is not written; `Finish` in the page accepts the \
+                 proposed boxes as they are",
                 output.display()
             ));
         }
@@ -248,7 +248,7 @@ fn check_images(log: &Path, film: &Film) -> Result<(), Failure> {
     let log = log.display();
     Err(Failure::failed(format!(
         "{log}: no image to annotate people in; `tagalong inspect {log}` lists its topics, and \
-         [input] of a config names those to take"
+         [input] of a config selects them"
     )))
 }
 

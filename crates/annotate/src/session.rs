@@ -285,8 +285,8 @@ impl Session {
         }
         let shown = self.output.display();
         Err(format!(
-            "{shown} was changed by another program; copy your version of it, and start \
-             `tagalong annotate` again to go on with it"
+            "{shown} was changed by another program; copy your version of it, and start `tagalong \
+             annotate` again to continue with it"
         ))
     }
 

@@ -14,31 +14,31 @@ use crate::outcome::Failure;
 /// The config for a camera below a conical mirror.
 const PANORAMIC: &str = "omni-rich";
 
-/// The config for colour alone where no network is installed.
+/// The config for colour alone if no network is installed.
 pub const WITHOUT_NETWORK: &str = "mono";
 
-/// The config for colour and depth, with which an installed network can be joined.
+/// The config for colour and depth, which can be combined with an installed network.
 pub const COLOUR_AND_DEPTH: &str = "depth-verified";
 
-/// The configs for depth. Of these one that suits the height of the camera comes first.
+/// The configs for depth. One that suits the height of the camera is tried first.
 const OF_DEPTH: [&str; 3] = [COLOUR_AND_DEPTH, "depth-alone", "depth-net-ekf"];
 
-/// Reason for which a pipeline is not taken where a camera was asked for.
+/// Reason why a pipeline without a camera is not chosen if the user named a camera.
 const WITHOUT_CAMERA: &str = "it uses no camera, and --camera names one";
 
-/// End of the reason of a log without any camera.
+/// End of the reason for a log without any camera.
 const NO_IMAGES: &str = "it has no images of a camera";
 
 /// A pipeline for logs of one kind.
 #[derive(Clone, Copy, Debug)]
 pub struct Choice {
-    /// Name of the built-in config, or [`NETWORK`] for that of an installed network.
+    /// Name of the built-in config, or [`NETWORK`] for the config of an installed network.
     pub config: &'static str,
     /// Reason for the choice.
     pub reason: &'static str,
 }
 
-/// The pipelines; the first that fits a log is taken. Where several fit, the order is that of
+/// The pipelines; the first that fits a log is chosen. If several fit, the order is that of
 /// `tagalong bench --leave-one-room-out` in docs/benchmarks.md.
 pub const CHOICES: [Choice; 11] = [
     Choice {
@@ -47,37 +47,37 @@ pub const CHOICES: [Choice; 11] = [
     },
     Choice {
         config: "depth-alone",
-        reason: "of those that need no colour it has the best HOTA in leave-one-room-out tests; \
-                 one verifier judges what it finds, so expect some furniture",
+        reason: "of those that need no colour it has the best HOTA in leave-one-room-out tests; it \
+                 has only one verifier, so expect some tracks on furniture",
     },
     Choice {
         config: "depth-net-ekf",
-        reason: "it needs no heads, and no settings for the height of the camera",
+        reason: "it needs neither visible heads nor settings for the height of the camera",
     },
     Choice {
         config: "stereo-verified",
-        reason: "verifiers judge what it finds; with 2 to 3 images a second stereo-svm-ekf has the \
-                 higher HOTA in real rooms",
+        reason: "verifiers check its detections; at 2 to 3 images per second stereo-svm-ekf has \
+                 the higher HOTA in real rooms",
     },
-    Choice { config: "stereo-street", reason: "it is the one for pairs with a wide baseline" },
+    Choice { config: "stereo-street", reason: "it is made for pairs with a wide baseline" },
     Choice {
         config: PANORAMIC,
-        reason: "it is the one for several people before a conical mirror",
+        reason: "it is made for several people in front of a conical mirror",
     },
-    Choice { config: NETWORK, reason: "you installed this network; places in metres are rough" },
+    Choice { config: NETWORK, reason: "you installed this network; positions in metres are rough" },
     Choice {
         config: "lidar",
-        reason: "it sees people all around by the points of the lidar; it was tried on simulated \
-                 ones alone",
+        reason: "it finds people all around in the points of the lidar; it was tried on simulated \
+                 points only",
     },
-    Choice { config: WITHOUT_NETWORK, reason: "it needs no depth; places in metres are rough" },
+    Choice { config: WITHOUT_NETWORK, reason: "it needs no depth; positions in metres are rough" },
     Choice {
         config: "laser-legs",
         reason: "it detects objects that move into free space; people who stand still may be missed",
     },
     Choice {
         config: "laser-follow",
-        reason: "without odometry, motion of the robot and of people cannot be told apart",
+        reason: "without odometry, motion of the robot cannot be told from motion of people",
     },
 ];
 
@@ -92,30 +92,30 @@ pub struct Fitting {
 /// Pipelines that fit a log, and the reasons why others do not.
 #[derive(Default)]
 pub struct Fittings {
-    /// Those that fit, the best first.
+    /// Those that fit, best first.
     pub fitting: Vec<Fitting>,
     /// Use of the topics of the log by a pipeline that takes all inputs.
     pub account: InputAccount,
-    /// The others that were tried.
+    /// Pipelines that were tried and do not fit.
     refusals: Vec<Refusal>,
-    /// A line about lost data; nothing for a whole log.
+    /// A line about lost data; empty for an intact log.
     damage: String,
-    /// Camera that was asked for.
+    /// Camera that the user named.
     camera: Option<String>,
 }
 
 /// A pipeline that does not fit a log.
 struct Refusal {
     config: &'static str,
-    /// Reason, with the remedy where there is one.
+    /// Reason, with the remedy if there is one.
     why: String,
-    /// Inputs that the pipeline requires and fails on; `None` where the log is of a kind that it is not made
-    /// for.
+    /// Inputs that the pipeline requires and on which it fails; `None` if it is not made for this
+    /// kind of log.
     required: Option<Vec<Input>>,
 }
 
 impl Fittings {
-    /// Returns the failure of a log that no pipeline fits.
+    /// Returns the failure for a log that no pipeline fits.
     pub fn none_fits(&self, log: &Path) -> Failure {
         let account: String =
             self.account.lines().iter().map(|line| format!("\n  {line}")).collect();
@@ -138,28 +138,30 @@ impl Fittings {
         ))
     }
 
-    /// Returns the reason of refusals for a camera that was asked for and is not in the log. Pipelines
-    /// without a camera have another one, which would not help.
+    /// Returns the reason of refusals because a named camera is not in the log. Pipelines without a
+    /// camera have another reason, which would not help.
     fn missing_camera(&self) -> Option<String> {
         let missing = format!("no camera `{}`", self.camera.as_ref()?);
         let refusal = self.refusals.iter().find(|refusal| refusal.why.contains(&missing))?;
-        // The key of a config is the option of the command line here.
+        // On the command line, the key of a config corresponds to the option.
         let why = refusal.why.replace("`camera` under [input]", "--camera");
         let remedy = format!("{NO_IMAGES}: leave out --camera");
         Some(why.replace(NO_IMAGES, &remedy))
     }
 
-    /// Returns the reason of all refusals, if it is the same, as of a file that is no log.
+    /// Returns the reason of all refusals, if it is the same for all, as for a file that is not a
+    /// log.
     fn common_reason(&self) -> Option<&str> {
         let (first, others) = self.refusals.split_first()?;
         let is_common = others.iter().all(|other| other.why == first.why);
         (is_common && !others.is_empty()).then_some(&*first.why)
     }
 
-    /// Returns what the log has, in words: the inputs that can be used, and how many topics cannot.
+    /// Returns the contents of the log in words: the inputs that can be used, and how many topics
+    /// cannot.
     pub fn contents(&self) -> String {
         let usable = self.account.usable();
-        // "Alone" only if nothing else is there.
+        // "Alone" is said only if there is nothing else.
         let is_alone = self.account.topics.len() == usable.len();
         let usable: Vec<&str> = usable.into_iter().map(words_of).collect();
         let usable = match usable.split_last() {
@@ -178,8 +180,9 @@ impl Fittings {
         }
     }
 
-    /// Returns the reason why no pipeline with a neural network is among those that fit, with the command
-    /// that installs one where none is installed; `None` if one is, and where a network has nothing to see.
+    /// Returns the reason why none of the pipelines that fit has a neural network, with the command
+    /// that installs one if none is installed; `None` if one has, or if a network would have no
+    /// images.
     pub fn without_network(&self) -> Option<String> {
         if self.fitting.iter().any(|fitting| fitting.choice.config == NETWORK) {
             return None;
@@ -192,15 +195,15 @@ impl Fittings {
         }
     }
 
-    /// Returns the pipeline that would be taken if a topic could be used, with the reason why it
-    /// cannot and the remedy; `None` if nothing in the log stands in the way of a better one.
+    /// Returns the pipeline that would be chosen if a topic could be used, with the reason why it
+    /// cannot and the remedy; `None` if nothing in the log prevents a better one.
     pub fn better(&self) -> Option<String> {
         let best = CHOICES[0].config;
         if self.fitting.first()?.choice.config == best {
             return None;
         }
         let topic = self.account.curable().find(|topic| {
-            // These two are what the first of all needs.
+            // The best pipeline needs just these two inputs.
             matches!(topic.could_be, Some("depth" | "colour"))
         });
         let Some(topic) = topic else { return self.refused_though_there() };
@@ -213,7 +216,7 @@ impl Fittings {
         ))
     }
 
-    /// Returns the first pipeline whose inputs the log has and that fails on them, with the reason.
+    /// Returns the first pipeline that fails on inputs although the log has them, with the reason.
     fn refused_though_there(&self) -> Option<String> {
         let usable = self.account.usable();
         let taken = self.fitting.first()?.choice.config;
@@ -227,7 +230,7 @@ impl Fittings {
     }
 }
 
-/// Returns the place of a config among the choices.
+/// Returns the index of a config among the choices.
 fn place_of(config: &str) -> Option<usize> {
     CHOICES.iter().position(|choice| choice.config == config)
 }
@@ -247,13 +250,13 @@ pub fn uses_camera(inputs: Inputs) -> bool {
     [Input::Colour, Input::Depth, Input::Right].into_iter().any(|input| inputs.uses(input))
 }
 
-/// Returns the inputs that a pipeline cannot do without.
+/// Returns the inputs that a pipeline requires.
 fn required(inputs: Inputs) -> Vec<Input> {
     let known = Input::ALL.into_iter().chain([Input::POINTS]);
     known.filter(|input| inputs.requires(*input)).collect()
 }
 
-/// Returns a line about a log of which part was lost; nothing for a whole one.
+/// Returns a line about a log that is partly lost; empty for an intact one.
 fn damage(found: &Inspection) -> String {
     if !found.data_lost {
         return String::new();
@@ -266,12 +269,12 @@ fn damage(found: &Inspection) -> String {
 pub fn fitting(log: &Path, registry: &Registry, args: &InputArgs, most: usize) -> Fittings {
     let mut found = Fittings { camera: args.camera.clone(), ..Fittings::default() };
     let input = args.applied(OuterSettings::default()).input;
-    // Of a log that cannot be read the trials tell why.
+    // If a log cannot be read, the trials report the reason.
     if let Ok(inspected) = tagalong_log::inspect(log, &input, &Limits::default()) {
         found.damage = damage(&inspected);
         found.account = inspected.inputs;
     }
-    // Pipelines of depth for a camera at another height.
+    // Pipelines for depth that are made for a camera at another height.
     let mut unsuited = Vec::new();
     for choice in CHOICES {
         let Some(config) = ConfigFile::named(choice.config) else { continue };
@@ -299,7 +302,7 @@ pub fn fitting(log: &Path, registry: &Registry, args: &InputArgs, most: usize) -
 /// Failure of a trial.
 struct Misfit {
     why: Failure,
-    /// As those of a [`Refusal`].
+    /// As in [`Refusal`].
     required: Option<Vec<Input>>,
 }
 
@@ -309,8 +312,8 @@ impl From<Failure> for Misfit {
     }
 }
 
-/// Returns the reason of a failure: without the path of the log and the list of its topics, which would
-/// be the same in each.
+/// Returns the reason of a failure, without the path of the log and the list of its topics, which
+/// would be the same for each pipeline.
 fn reason(log: &Path, why: &Failure) -> String {
     let reason = why.message.lines().next().unwrap_or_default();
     let log = log.display();
@@ -318,8 +321,8 @@ fn reason(log: &Path, why: &Failure) -> String {
     reason.replacen(&format!("`{log}` "), "the log ", 1).replacen(&format!("`{log}`: "), "", 1)
 }
 
-/// Takes the first frame of a log through a pipeline; returns false for a camera at another height or
-/// with another pitch than those that the config is for.
+/// Runs a pipeline on the first frame of a log; returns false if the height or the pitch of the
+/// camera is outside of the range of the config.
 fn try_config(
     config: &ConfigFile,
     log: &Path,
@@ -345,21 +348,21 @@ fn try_config(
         let why = Failure::failed(format!("no frame that can be used{why}"));
         return Err(Misfit { why, required });
     };
-    // Any colour image passes for a panorama, and a panorama for any image.
+    // Any colour image is accepted as a panorama, and a panorama as any image.
     if item.frame.camera.panorama().is_some() != (config.stem() == PANORAMIC) {
         return Err(Failure::failed("another kind of camera").into());
     }
-    // Without odometry the robot is taken to be at rest, and all things seem to move.
+    // Without odometry the robot is assumed to be at rest, so that all objects seem to move.
     if settings.suits.odometry && !source.has_odometry() {
         return Err(Failure::failed("no odometry").into());
     }
-    // A pair with a wide base sees no people nearby, one with a narrow base none far away.
+    // A pair with a wide baseline sees no people nearby, one with a narrow baseline none far away.
     if let Some(baseline_m) = source.facts().baseline_m
         && settings.suits.baseline_off_m(baseline_m) > 0.0
     {
         let [low, high] = settings.suits.baseline_m.unwrap_or_default();
         return Err(Failure::failed(format!(
-            "for pairs with a baseline of {low} to {high} m, and this one has {baseline_m:.2} m"
+            "for pairs with a baseline of {low} to {high} m, but this one has {baseline_m:.2} m"
         ))
         .into());
     }

@@ -1,4 +1,4 @@
-//! Config files, with the tables that are not the pipeline's.
+//! Config files, with the tables outside of the pipeline.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ use crate::outcome::Failure;
 use crate::recorded_boxes::RecordedBoxes;
 use crate::suggest::{config_hint, not_a_config};
 
-/// Config that is used where neither a config nor a log is given.
+/// Config that is used if neither a config nor a log is given.
 const DEFAULT: &str = "depth-ekf";
 
 /// Text of a config file, with its path.
@@ -26,26 +26,26 @@ pub struct ConfigFile {
     source: ConfigSource,
 }
 
-/// Tables of a config that are not the pipeline's.
+/// Tables of a config outside of the pipeline.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct OuterSettings {
     /// `[input]`: topics and frames of the images.
     pub input: InputSettings,
-    /// `[limits]`: largest sizes of a log's parts.
+    /// `[limits]`: maximum sizes of the parts of a log.
     pub limits: Limits,
     /// `[output]`: contents of the output files.
     pub output: OutputSettings,
 }
 
-/// Place in the text of a config for the name of the log.
+/// Placeholder for the name of the log in the text of a config.
 const LOG_PLACE: &str = "{log}";
 
 impl ConfigFile {
     /// Reads a config: a file, the name of a built-in one, or that of an installed network.
     ///
     /// # Errors
-    /// A file that is missing, unreadable, too long or no text: exit code 2.
+    /// A file that is missing, unreadable, too long or not text: exit code 2.
     pub fn read(path: &Path) -> Result<Self, Failure> {
         match ConfigSource::open(path) {
             Ok(source) => Ok(Self { source }),
@@ -57,15 +57,15 @@ impl ConfigFile {
         }
     }
 
-    /// Returns the config of a text, whose relative paths are resolved against `folder`.
+    /// Returns the config with this text; its relative paths are resolved against `folder`.
     pub fn of_text(text: String, folder: &Path) -> Self {
         Self { source: ConfigSource::from_text(text, folder) }
     }
 
-    /// Returns the config that is used where neither a config nor a log is given.
+    /// Returns the config that is used if neither a config nor a log is given.
     ///
     /// # Errors
-    /// None in a whole program: the config is part of it.
+    /// None in an intact program, because the config is part of it.
     pub fn built_in() -> Result<Self, Failure> {
         Ok(Self { source: ConfigSource::builtin(DEFAULT)? })
     }
@@ -75,35 +75,36 @@ impl ConfigFile {
         ConfigSource::builtin_names()
     }
 
-    /// Returns the built-in config of a name, or of the file that it is in a clone, or the config of
-    /// an installed network; `None` if there is none.
+    /// Returns the built-in config with this name, or the one that has this path in a clone, or the
+    /// config of an installed network; `None` if there is none.
     pub fn named(name: &str) -> Option<Self> {
         let source = ConfigSource::builtin(name).ok();
         let source = source.or_else(|| ConfigSource::from_file(installed::config_file(name)?).ok());
         Some(Self { source: source? })
     }
 
-    /// Returns its name without folder and extension.
+    /// Returns the name of the file without folder and extension.
     pub fn stem(&self) -> String {
         self.source.stem()
     }
 
-    /// Returns its name without folder.
+    /// Returns the name of the file without folder.
     pub fn name(&self) -> String {
         self.source.path().file_name().unwrap_or_default().to_string_lossy().into_owned()
     }
 
-    /// Returns the config with another text at the same path, so that it names the same files.
+    /// Returns the config with another text at the same path, so that it refers to the same files.
     pub fn with_text(&self, text: String) -> Self {
         Self { source: self.source.with_text(text) }
     }
 
-    /// Returns true if its text has a place for the name of a log.
+    /// Returns true if the text contains the placeholder for the name of a log.
     pub fn differs_by_log(&self) -> bool {
         self.source.text().contains(LOG_PLACE)
     }
 
-    /// Returns the config for a log: `{log}` in its text stands for the name of the log without ending.
+    /// Returns the config for a log: `{log}` in its text is replaced by the name of the log without
+    /// extension.
     #[must_use]
     pub fn on_log(&self, log: &Path) -> Self {
         let name = log.file_stem().unwrap_or_default().to_string_lossy();
@@ -124,7 +125,7 @@ impl ConfigFile {
         self.source.folder()
     }
 
-    /// SHA-256 of its bytes, and of those of the configs that it extends.
+    /// Returns the SHA-256 of the bytes of this config and of those that it extends.
     pub fn sha256(&self) -> String {
         let mut digest = Sha256::new_with_prefix(self.source.text().as_bytes());
         if let Ok(document) = self.source.document() {
@@ -133,8 +134,8 @@ impl ConfigFile {
         digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
-    /// Returns true for the built-in config of a name, whatever the file is called, and for one that extends
-    /// it.
+    /// Returns true for the built-in config with this name, whatever the file is called, and for
+    /// one that extends it.
     pub fn is_or_extends(&self, builtin: &str) -> bool {
         let Ok(shipped) = ConfigSource::builtin(builtin) else { return false };
         if self.source.text() == shipped.text() {
@@ -144,7 +145,7 @@ impl ConfigFile {
         document.bases().any(|(_, text)| text == shipped.text())
     }
 
-    /// Returns the files that its settings name, such as models, with the name used there.
+    /// Returns the files to which its settings refer, such as models, with the names used there.
     pub fn files(&self) -> Vec<(String, PathBuf)> {
         self.source.files()
     }
@@ -161,7 +162,7 @@ impl ConfigFile {
         self.pipeline_on(registry, seed, None)
     }
 
-    /// Builds the pipeline as [`ConfigFile::pipeline`] does, for at most so many threads.
+    /// Builds the pipeline as [`ConfigFile::pipeline`] does, for at most this number of threads.
     pub fn pipeline_on(
         &self,
         registry: &Registry,
@@ -180,8 +181,8 @@ impl ConfigFile {
         Ok((pipeline, config))
     }
 
-    /// Returns the failure of a config that cannot be built, with the command that installs a known network
-    /// that it names.
+    /// Returns the failure for a config that cannot be built; if it names a known network that is
+    /// not installed, with the command that installs it.
     fn explained(&self, error: BuildError) -> Failure {
         let settings = self.source.document().and_then(|document| document.table());
         let remedy = settings.ok().as_ref().and_then(installed::missing_model);
@@ -194,12 +195,12 @@ impl ConfigFile {
         }
     }
 
-    /// Returns its text with those of the configs that it extends.
+    /// Returns the text of the config together with those that it extends.
     pub fn whole_text(&self) -> String {
         self.source.whole_text()
     }
 
-    /// Returns the tables that are not the pipeline's.
+    /// Returns the tables outside of the pipeline.
     pub fn outer(&self) -> Result<OuterSettings, Failure> {
         Ok(OuterSettings {
             input: self.table("input")?,
@@ -208,16 +209,16 @@ impl ConfigFile {
         })
     }
 
-    /// Returns the tables that are not the pipeline's, with the sources of obstacles that its collision
-    /// monitor asks for as part of the input.
+    /// Returns the tables outside of the pipeline, with the obstacle sources of its collision
+    /// monitor as part of the input.
     pub fn outer_for(&self, pipeline: &Pipeline) -> Result<OuterSettings, Failure> {
         let LogSettings { input, limits, .. } = LogSettings::of(pipeline)?;
         Ok(OuterSettings { input, limits, output: pipeline.config().table("output")? })
     }
 
-    /// Returns a note for each list that replaces an inherited one whole: a reader who meant to change one
-    /// setting loses all others; and on recorded boxes whose IDs are passed over. The config that was written
-    /// with an installed network means its lists.
+    /// Returns a note for each list that replaces an inherited one as a whole, because changing one
+    /// setting this way loses all others; and on recorded boxes whose IDs are ignored. The config
+    /// that is written for an installed network replaces its lists on purpose.
     pub fn notes(&self) -> Result<Vec<String>, Failure> {
         let installed = installed::config_file(&self.stem());
         if installed.is_some_and(|path| path == self.source.path()) {
@@ -241,14 +242,15 @@ impl ConfigFile {
         Ok(notes)
     }
 
-    /// Reads one top-level table, with places for its mistakes.
+    /// Reads one top-level table, with positions for its errors.
     fn table<T: Settings>(&self, name: &str) -> Result<T, BuildError> {
         self.source.table(name)
     }
 }
 
 impl From<BuildError> for Failure {
-    /// Converts the error of a config: exit code 2. A config that is not there gets a suggestion.
+    /// Converts the error of a config: exit code 2. For a config that does not exist it adds a
+    /// suggestion.
     fn from(error: BuildError) -> Self {
         if let BuildError::Unreadable { path, kind: ErrorKind::NotFound, .. } = &error
             && let Some(remedy) = path.to_str().and_then(installed::missing_network)
@@ -282,17 +284,17 @@ impl From<tagalong::Error> for Failure {
     }
 }
 
-/// Returns the failure of a log that does not fit a config: a topic of a wrong kind is shown with the
-/// line that names it.
+/// Returns the failure for a log that does not fit a config. For a topic of the wrong kind it shows
+/// the line of the config that names it.
 pub fn refused_log(error: LogError, config: &ResolvedConfig) -> Failure {
     refusal(error, config).into()
 }
 
 impl OuterSettings {
-    /// Returns the config of a pipeline with these tables in place of those that it has.
+    /// Returns the config of a pipeline with these tables in place of its own.
     ///
     /// # Errors
-    /// Settings that TOML cannot express: exit code 1.
+    /// Settings that cannot be written as TOML: exit code 1.
     pub fn resolved_with(&self, config: &ResolvedConfig) -> Result<ResolvedConfig, Failure> {
         config.with_tables(self).map_err(Failure::failed)
     }

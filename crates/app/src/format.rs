@@ -5,7 +5,7 @@ use clap::ValueEnum;
 /// Output format of results.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Format {
-    /// For people.
+    /// Human-readable text.
     #[default]
     Text,
     /// For programs.
@@ -15,10 +15,10 @@ pub enum Format {
 /// Output format of tables.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum TableFormat {
-    /// For people.
+    /// Human-readable text.
     #[default]
     Text,
-    /// For pages.
+    /// For documentation pages.
     Markdown,
     /// For programs.
     Json,

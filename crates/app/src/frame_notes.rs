@@ -1,5 +1,5 @@
-//! Notes of a run on one frame: every candidate with its place and its fate, and the tests that
-//! dropped others. They are what a page needs to say why a person was missed.
+//! Notes of a run on one frame: every candidate with its position and its fate, and the tests that
+//! dropped other candidates. A page needs them to explain why a person was missed.
 
 use std::collections::BTreeSet;
 
@@ -27,9 +27,9 @@ pub struct FrameNotes {
     pub robot_odom: [f64; 3],
     /// All detections, each with its fate.
     pub candidates: Vec<CandidateNote>,
-    /// Tests that dropped anything, in the order of the stages.
+    /// Tests that dropped candidates, in the order of the stages.
     pub dropped: Vec<DroppedNote>,
-    /// Numbers of the tracks that ended in this frame.
+    /// IDs of the tracks that ended in this frame.
     pub ended: Vec<u32>,
     /// Tracks whose ID may be that of another person.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -37,7 +37,7 @@ pub struct FrameNotes {
     /// IDs of earlier frames that this frame shows to be wrong.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub corrections: Vec<CorrectionNote>,
-    /// The target lock and the command, where the pipeline has a controller.
+    /// State of the target lock and the command, if the pipeline has a controller.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub drive: Option<DriveNote>,
 }
@@ -51,10 +51,10 @@ pub struct DoubtNote {
     pub others: Vec<u32>,
 }
 
-/// Two IDs that were the wrong way round.
+/// Two IDs that were exchanged.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CorrectionNote {
-    /// First frame in which they were.
+    /// First frame in which they were exchanged.
     pub since: u64,
     /// The two IDs.
     pub ids: [u32; 2],
@@ -65,7 +65,7 @@ pub struct CorrectionNote {
 pub struct DriveNote {
     /// Name of the lock's state, for example `locked`.
     pub lock: String,
-    /// Meaning of the state, in a sentence.
+    /// Meaning of the state, as a sentence.
     pub lock_about: String,
     /// Cause of the last change of state.
     pub why: String,
@@ -75,28 +75,29 @@ pub struct DriveNote {
     pub belief: Option<f64>,
     /// Name of the command's reason, for example `limited`.
     pub reason: String,
-    /// Meaning of the reason, in a sentence.
+    /// Meaning of the reason, as a sentence.
     pub reason_about: String,
-    /// The person, the place or the sensor that is the cause, with its distance against its limit;
-    /// empty where there is none.
+    /// The person, the position or the sensor that is the cause, with its distance and the limit;
+    /// empty without one.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub cause: String,
     /// Commanded speed, m/s.
     pub forward_mps: f64,
-    /// Commanded rate of turn, to the left, rad/s.
+    /// Commanded turn rate, positive to the left, rad/s.
     pub turn_rps: f64,
-    /// `drives` as the controller asks, `slower`, or `stands`; empty in runs of earlier versions.
+    /// `drives` if the command is that of the controller, otherwise `slower` or `stands`; empty in
+    /// runs of earlier versions.
     #[serde(default)]
     pub motion: String,
-    /// Places of things that stand, in the odometry frame, cm, x and y in turn.
+    /// Positions of fixed obstacles in the odometry frame, cm, alternating x and y.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub things_cm: Vec<i32>,
-    /// Places of people and of things that move, in the odometry frame, cm, x and y in turn.
+    /// Positions of people and of moving obstacles in the odometry frame, cm, alternating x and y.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub movers_cm: Vec<i32>,
 }
 
-/// Side of the cells in which places of obstacles are noted, cm.
+/// Side of the grid cells for positions of obstacles, cm.
 const CELL_CM: i32 = 10;
 
 /// Detection with its fate.
@@ -106,7 +107,7 @@ pub struct CandidateNote {
     pub box_px: [f64; 4],
     /// Centre of the head in the odometry frame, m.
     pub head_odom_m: [f64; 3],
-    /// Log-odds that it is a person, with those of the verifiers.
+    /// Log-odds that it is a person, including those of the verifiers.
     pub score: f64,
     /// Plugin that detected it.
     pub source: String,
@@ -139,31 +140,31 @@ pub struct DroppedNote {
     pub test: String,
     /// Number of candidates, windows or pixels that it dropped.
     pub count: u64,
-    /// Boxes of the first of them that have a region in the image, pixels.
+    /// Boxes of the first of these that have a region in the image, pixels.
     pub boxes_px: Vec<[f64; 4]>,
-    /// Values that some of these boxes were dropped for.
+    /// Values because of which some of these boxes were dropped.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub measured: Vec<MeasuredNote>,
 }
 
-/// Value that a box was dropped for.
+/// Value because of which a box was dropped.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MeasuredNote {
-    /// Position of the box in `boxes_px`.
+    /// Index of the box in `boxes_px`.
     pub at: usize,
     /// The value and its limits.
     #[serde(flatten)]
     pub value: MeasuredValue,
 }
 
-/// Value of a candidate, and the settings that it breaks.
+/// Value of a candidate, and the settings that it violates.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MeasuredValue {
     /// Name of the value.
     pub what: String,
     /// The value.
     pub value: f64,
-    /// Settings with their values, that of the test first.
+    /// Settings with their values, beginning with that of the test.
     pub limits: Vec<(String, f64)>,
 }
 
@@ -177,7 +178,7 @@ impl MeasuredValue {
         }
     }
 
-    /// Returns the value against its limits, for example `cost 0.47 > refine_cost 0.4`.
+    /// Returns the value compared with its limits, for example `cost 0.47 > refine_cost 0.4`.
     pub fn in_words(&self) -> String {
         let limits: Vec<String> = self
             .limits
@@ -254,7 +255,7 @@ impl DriveNote {
     }
 }
 
-/// Returns the middles of the cells with obstacles that move, or that stand, each once.
+/// Returns the centres of the cells with moving or with fixed obstacles, each once.
 fn cells_cm(
     obstacles: &[ObstaclePoint],
     moves: bool,
@@ -298,7 +299,7 @@ fn dropped_note(entry: &Dropped) -> DroppedNote {
     let mut measured = entry.measured.iter().peekable();
     for (at, rect) in entry.places.iter().enumerate() {
         let own = measured.next_if(|(place, _)| *place == at);
-        // A region without an area says nothing about the place.
+        // A region without an area gives no information about the position.
         if rect.area() > 0.0 {
             let at = boxes_px.len();
             boxes_px.push(corners(rect));
@@ -312,7 +313,7 @@ fn corners(rect: &Rect) -> [f64; 4] {
     [rect.x, rect.y, rect.width, rect.height].map(|v| rounded(v, 10.0))
 }
 
-/// Rounds to a fraction of one; the result has no negative zero.
+/// Rounds to a fraction of one; the result is never a negative zero.
 fn rounded(value: f64, parts: f64) -> f64 {
     (value * parts).round() / parts + 0.0
 }

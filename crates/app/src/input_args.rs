@@ -30,7 +30,7 @@ pub enum StampArg {
 }
 
 impl InputArgs {
-    /// Returns the settings of a config with these arguments in place of what they say.
+    /// Returns the settings of a config with those of these arguments replaced.
     pub fn applied(&self, mut outer: OuterSettings) -> OuterSettings {
         if let Some(stamps) = self.stamps {
             outer.input.stamps = match stamps {
@@ -41,7 +41,7 @@ impl InputArgs {
         }
         if let Some(name) = &self.camera {
             outer.input.camera = Some(match outer.input.camera {
-                // The pose of a config is kept.
+                // The pose in the config is kept.
                 Some(CameraSettings::Mounted(mount)) => {
                     CameraSettings::Mounted(mount.with_name(name))
                 }

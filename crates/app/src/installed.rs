@@ -1,8 +1,8 @@
 //! Networks that the user has installed, with their configs.
 //!
-//! The folder of networks holds for each the file `NAME.onnx`, its config `NAME.toml`, the config
-//! `NAME-depth.toml` that joins it with depth, and its card `NAME.card.toml`. The file `default` names
-//! the one that is taken for a log with colour alone.
+//! For each network, the folder of networks contains the file `NAME.onnx`, its config `NAME.toml`,
+//! the config `NAME-depth.toml` that combines it with depth, and its card `NAME.card.toml`. The
+//! file `default` names the network that is used for a log with colour alone.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,16 +12,16 @@ use tagalong_network::networks_folder;
 
 /// Name of the config of the default network.
 pub const NETWORK: &str = "network";
-/// Table of networks that are known to work, as TOML. Its figures are those of the command that it
+/// Table of networks that are known to work, as TOML. Its figures come from the command that it
 /// names.
 pub const KNOWN_NETWORKS: &str = include_str!("networks.toml");
 /// File with the name of the default network.
 const DEFAULT: &str = "default";
-/// Config of the repository that joins the network of a file with depth.
+/// Config of the repository that combines the network in a file with depth.
 const OF_A_FILE_AND_DEPTH: &str = "depth-network";
-/// Configs of the repository that are not built in, because they run the network of a file.
+/// Configs of the repository that are not built in, because they run the network in a file.
 const OF_A_FILE: [&str; 3] = ["colour-net", OF_A_FILE_AND_DEPTH, "onnx"];
-/// End of the name of a config that joins a network with depth.
+/// Suffix of the name of a config that combines a network with depth.
 pub const WITH_DEPTH: &str = "-depth";
 
 /// Files of a network in a folder.
@@ -31,7 +31,7 @@ pub struct NetworkFiles {
     pub onnx: PathBuf,
     /// Config that runs it.
     pub config: PathBuf,
-    /// Config that joins it with depth.
+    /// Config that combines it with depth.
     pub depth_config: PathBuf,
     /// Card with its hash and licence.
     pub card: PathBuf,
@@ -40,7 +40,7 @@ pub struct NetworkFiles {
 }
 
 impl NetworkFiles {
-    /// Returns the files of a network of this name.
+    /// Returns the files of the network with this name.
     pub fn of(folder: &Path, name: &str) -> Self {
         Self {
             onnx: folder.join(format!("{name}.onnx")),
@@ -52,8 +52,9 @@ impl NetworkFiles {
     }
 }
 
-/// Returns the config of an installed network by its name, with [`WITH_DEPTH`] behind it the config
-/// that joins it with depth, or that of the default one for [`NETWORK`]; `None` if there is none.
+/// Returns the config of an installed network by its name; with the suffix [`WITH_DEPTH`] the
+/// config that combines it with depth, and for [`NETWORK`] that of the default network. `None` if
+/// there is none.
 pub fn config_file(name: &str) -> Option<PathBuf> {
     config_in(&networks_folder()?, name)
 }
@@ -69,8 +70,8 @@ fn config_in(folder: &Path, name: &str) -> Option<PathBuf> {
     config.is_file().then_some(config)
 }
 
-/// Returns the remedy for a name that stands for the config of a network and leads to none; `None` for
-/// any other name.
+/// Returns the remedy for a name of a network's config that does not exist; `None` for any other
+/// name.
 pub fn missing_network(name: &str) -> Option<String> {
     remedy(&installed_networks(), name)
 }
@@ -80,8 +81,8 @@ fn remedy(installed: &[String], name: &str) -> Option<String> {
     let is_installed = installed.iter().any(|known| known == network);
     if let Some(file) = known_file(network).filter(|_| !is_installed) {
         return Some(format!(
-            "`{name}` runs a network that is known, and not installed: `tagalong model --install \
-             {file}` installs it, and `tagalong model --list` tells where to get the file"
+            "`{name}` runs a known network that is not installed: `tagalong model --install \
+             {file}` installs it, and `tagalong model --list` says where to get the file"
         ));
     }
     if name != NETWORK && !OF_A_FILE.contains(&name) {
@@ -95,13 +96,13 @@ fn remedy(installed: &[String], name: &str) -> Option<String> {
     };
     let with_depth = if name == OF_A_FILE_AND_DEPTH { WITH_DEPTH } else { "" };
     Some(format!(
-        "`{name}` runs the neural network of a file, and is not built in: name one that is installed, as \
-         `{first}{with_depth}`"
+        "`{name}` runs a neural network from a file, and is not built in: name an installed one, \
+         such as `{first}{with_depth}`"
     ))
 }
 
-/// Returns the remedy for settings that name, as the `model` of a network, a known one that is not
-/// installed; `None` if there is none.
+/// Returns the remedy for settings whose `model` is a known network that is not installed; `None`
+/// if there is none.
 pub fn missing_model(settings: &toml::Table) -> Option<String> {
     let installed = [installed_networks(), installed_embeddings()].concat();
     models(settings).into_iter().find_map(|model| {
@@ -110,7 +111,7 @@ pub fn missing_model(settings: &toml::Table) -> Option<String> {
     })
 }
 
-/// Returns the values of all keys `model`, in tables within tables, too.
+/// Returns the values of all keys `model`, including those in nested tables.
 fn models(settings: &toml::Table) -> Vec<&str> {
     let mut found = Vec::new();
     for (key, value) in settings {
@@ -126,7 +127,7 @@ fn models(settings: &toml::Table) -> Vec<&str> {
     found
 }
 
-/// Returns the name of the file of a known network.
+/// Returns the file name of a known network.
 fn known_file(name: &str) -> Option<String> {
     let table: toml::Table = toml::from_str(KNOWN_NETWORKS).ok()?;
     let networks = table.get("network")?.as_array()?;
@@ -134,13 +135,13 @@ fn known_file(name: &str) -> Option<String> {
     named?.get("file")?.as_str().map(str::to_owned)
 }
 
-/// Returns the names of the installed networks that have a config, in the order of the alphabet.
+/// Returns the names of the installed networks that have a config, in alphabetical order.
 pub fn installed_networks() -> Vec<String> {
     networks_folder().map(|folder| installed_in(&folder)).unwrap_or_default()
 }
 
 /// Returns the names of the installed networks without a config, which are those for
-/// re-identification, in the order of the alphabet.
+/// re-identification, in alphabetical order.
 pub fn installed_embeddings() -> Vec<String> {
     networks_folder().map(|folder| onnx_files(&folder, false)).unwrap_or_default()
 }
@@ -155,7 +156,7 @@ pub fn installed_configs() -> Vec<String> {
     names
 }
 
-/// Returns the name of the network that is taken for a log with colour alone.
+/// Returns the name of the network that is used for a log with colour alone.
 pub fn default_network() -> Option<String> {
     let folder = networks_folder()?;
     default_in(&folder, &installed_in(&folder))
@@ -165,7 +166,7 @@ fn installed_in(folder: &Path) -> Vec<String> {
     onnx_files(folder, true)
 }
 
-/// Returns the names of the networks of a folder that have a config, or of those that have none.
+/// Returns the names of the networks in a folder that have a config, or of those that have none.
 fn onnx_files(folder: &Path, with_config: bool) -> Vec<String> {
     let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
     let mut names = Vec::new();
@@ -180,7 +181,7 @@ fn onnx_files(folder: &Path, with_config: bool) -> Vec<String> {
     names
 }
 
-/// Returns the network that the file `default` names, or else the first one.
+/// Returns the network that the file `default` names, or otherwise the first one.
 fn default_in(folder: &Path, installed: &[String]) -> Option<String> {
     let named = read_text(&folder.join(DEFAULT), FileLimit::Config).unwrap_or_default();
     let named = installed.iter().find(|name| *name == named.trim());

@@ -1,8 +1,8 @@
 //! Shared parts of the applications behind the `tagalong` command: failures with their exit codes,
 //! output formats, config files and the choice among them, suggestions for mistyped paths, signals, progress and times.
 //!
-//! An application takes its arguments and returns an [`outcome::Outcome`]; the command line turns
-//! that into an exit code and a message.
+//! An application receives its arguments and returns an [`outcome::Outcome`]; the command line
+//! converts that to an exit code and a message.
 //!
 //! ```
 //! use tagalong_app::config_file::ConfigFile;

@@ -1,20 +1,20 @@
-//! Logs and scenes that a config was not made for, by its `[suits]`.
+//! Logs and scenes for which a config is not suitable, according to its `[suits]`.
 
 use tagalong_log::FrameSource;
 use tagalong_math::counted;
 use tagalong_pipeline::Suits;
 
-/// Deviation of the pitch of the camera from the stated range that does not matter, degrees.
+/// Tolerance of the camera's pitch outside of the stated range, degrees.
 const PITCH_TOLERANCE_DEG: f64 = 3.0;
 
-/// Properties of a log or a scene that `[suits]` of a config may speak of.
+/// Properties of a log or a scene that `[suits]` of a config can refer to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Traits {
-    /// Height of the camera above the floor, m; `None` without a camera, or where it is not known.
+    /// Height of the camera above the floor, m; `None` without a camera, or if it is not known.
     pub camera_height_m: Option<f64>,
     /// Angle of its optical axis below the horizon, degrees, likewise.
     pub pitch_down_deg: Option<f64>,
-    /// Distance of the right camera from the left one, m; `None` without a pair.
+    /// Baseline: distance of the right camera from the left one, m; `None` without a pair.
     pub baseline_m: Option<f64>,
     /// True if the motion of the robot is known.
     pub has_odometry: bool,
@@ -34,13 +34,13 @@ impl Traits {
         }
     }
 
-    /// Returns a sentence for each property that does not fit a config; none where all fit.
+    /// Returns a sentence for each property that does not fit a config; empty if all fit.
     pub fn misfits(&self, suits: &Suits) -> Vec<String> {
         let mut found = Vec::new();
         if suits.odometry && !self.has_odometry {
             found.push(
-                "the config is for a robot with odometry, and there is none: things that the robot \
-                 passes seem to move"
+                "the config is for a robot with odometry, but there is none: objects that the \
+                 robot passes seem to move"
                     .to_owned(),
             );
         }
@@ -48,35 +48,35 @@ impl Traits {
             && suits.baseline_off_m(baseline_m) > 0.0
         {
             found.push(format!(
-                "the pair has a baseline of {baseline_m:.2} m, and the config is for {low} to {high} m"
+                "the pair has a baseline of {baseline_m:.2} m, but the config is for {low} to {high} m"
             ));
         }
         if let (Some(height_m), Some([low, high])) = (self.camera_height_m, suits.camera_height_m)
             && suits.height_off_m(height_m) > Suits::HEIGHT_TOLERANCE_M
         {
             found.push(format!(
-                "the camera is {height_m:.2} m high, and the config is for {low} to {high} m"
+                "the camera is {height_m:.2} m high, but the config is for {low} to {high} m"
             ));
         }
         if let (Some(pitch_deg), Some([low, high])) = (self.pitch_down_deg, suits.pitch_down_deg)
             && suits.pitch_off_deg(pitch_deg) > PITCH_TOLERANCE_DEG
         {
             found.push(format!(
-                "the camera looks down by {pitch_deg:.0} degrees, and the config is for {low} to {high}"
+                "the camera looks down by {pitch_deg:.0} degrees, but the config is for {low} to {high}"
             ));
         }
         found
     }
 }
 
-/// Logs, or scenes, each with the reasons for which a config does not suit it; none where it does.
+/// Logs, or scenes, each with the reasons why a config is not suitable for it; empty if it is.
 pub type LogMisfits = Vec<(String, Vec<String>)>;
 
 /// Command that leads to better configs for a log.
 pub const COMPARE: &str = "`tagalong doctor LOG` compares the configs that fit";
 
-/// Returns one note for a config and all logs, or scenes, that it does not suit, each with the reasons;
-/// `None` if it suits all.
+/// Returns one note for a config and all logs, or scenes, for which it is not suitable, each with
+/// the reasons; `None` if it suits all.
 pub fn misfit_note(config: &str, unsuited: &[(String, Vec<String>)]) -> Option<String> {
     let unsuited = unsuited.iter().filter(|(_, misfits)| !misfits.is_empty());
     let each: Vec<String> =
@@ -85,13 +85,14 @@ pub fn misfit_note(config: &str, unsuited: &[(String, Vec<String>)]) -> Option<S
         return None;
     }
     Some(format!(
-        "{config} is by its [suits] not made for {}: expect worse tracks",
+        "{config} is not made for {} according to its [suits]: expect worse tracks",
         each.join(", ")
     ))
 }
 
-/// Returns one note for all configs: that of [`misfit_note`] where a single one does not suit some logs,
-/// and the names of several with their numbers of logs; `None` if each suits all.
+/// Returns one note for all configs. For a single config that does not suit some logs it is that of
+/// [`misfit_note`]; for several it has their names with the numbers of logs; `None` if each suits
+/// all.
 pub fn misfits_note(configs: &[(String, LogMisfits)]) -> Option<String> {
     let mut each = Vec::new();
     let mut last = None;
@@ -107,7 +108,8 @@ pub fn misfits_note(configs: &[(String, LogMisfits)]) -> Option<String> {
         return misfit_note(config, logs);
     }
     Some(format!(
-        "{} configs are by their [suits] not made for some of the logs, where tracks are worse: {}",
+        "{} configs are not made for some of the logs according to their [suits], and track worse \
+         there: {}",
         each.len(),
         each.join(", ")
     ))
@@ -134,7 +136,7 @@ mod tests {
         };
         let found = SEEN.misfits(&suits);
         let parts =
-            ["there is none", "0.50 m, and the config is for 0 to 0.3 m", "0.50 m high", "20"];
+            ["there is none", "0.50 m, but the config is for 0 to 0.3 m", "0.50 m high", "20"];
         assert_eq!(found.len(), parts.len(), "{found:?}");
         for (misfit, part) in found.iter().zip(parts) {
             assert!(misfit.contains(part), "{misfit}");
@@ -156,7 +158,7 @@ mod tests {
             misfit_note("low", &[log("a", &["too high"]), log("b", &[]), log("c", &["x", "y"])]);
         let note = note.unwrap();
         assert!(
-            note.starts_with("low is by its [suits] not made for a (too high), c (x; y)"),
+            note.starts_with("low is not made for a (too high), c (x; y) according to its [suits]"),
             "{note}"
         );
         assert_eq!(misfit_note("low", &[log("b", &[])]), None);
@@ -176,7 +178,7 @@ mod tests {
         let two = config("wide", [&["too high"], &["x", "y"]]);
         let fits = config("all", [&[], &[]]);
         let note = misfits_note(&[one.clone(), fits.clone(), two]).expect("a note");
-        assert!(note.starts_with("2 configs are by their [suits] not made for some"), "{note}");
+        assert!(note.starts_with("2 configs are not made for some"), "{note}");
         assert!(note.ends_with(": low (1 log), wide (2 logs)"), "{note}");
         assert_eq!(misfits_note(&[one.clone(), fits.clone()]), misfit_note("low", &one.1));
         assert_eq!(misfits_note(&[fits]), None);

@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf, absolute};
 use serde::{Deserialize, Serialize};
 use tagalong_config::path_text;
 
-/// Contents of `origin.json`: the only file of a run that depends on the place of its log.
+/// Contents of `origin.json`, the only file of a run that depends on the folder of its log.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Origin {
     /// Path of the log.
     #[serde(with = "path_text")]
     pub log: PathBuf,
-    /// Path of the config, or the name of a built-in one; none if the program chose it.
+    /// Path of the config, or the name of a built-in one; `None` if the program chose it.
     #[serde(with = "path_text::optional")]
     pub config: Option<PathBuf>,
 }
@@ -26,7 +26,7 @@ impl Origin {
     }
 }
 
-/// Returns the absolute path, or the path as it is where the current folder is unknown.
+/// Returns the absolute path, or the path unchanged if the current folder is unknown.
 fn whole(path: &Path) -> PathBuf {
     absolute(path).unwrap_or_else(|_| path.to_owned())
 }

@@ -1,4 +1,4 @@
-//! Ends of a command: exit codes, failures, and printing.
+//! End of a command: exit codes, failures, and printing.
 
 use std::borrow::Cow;
 use std::fmt::Display;
@@ -11,7 +11,7 @@ use tagalong_log::write::WriteError;
 /// End of a command that did not fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ended {
-    /// All went well.
+    /// Success.
     Well,
     /// Finished, but part of the log was lost or could not be used.
     WithLoss,
@@ -38,7 +38,7 @@ impl Ended {
     }
 }
 
-/// Reason of a failed command, as shown to the user.
+/// Reason of a failed command, as it is shown to the user.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Failure {
     /// The exit code.
@@ -58,14 +58,14 @@ impl Failure {
         Self { code: 2, message: message.to_string() }
     }
 
-    /// Returns the quiet end after the reader of stdout is gone (`| head`).
+    /// Returns the silent end after the reader of stdout is gone (`| head`).
     fn nobody_listens() -> Self {
         Self { code: 0, message: String::new() }
     }
 }
 
 impl From<WriteError> for Failure {
-    /// Converts the error of writing results: a full disk is told as one, whenever it happens.
+    /// Converts the error of writing results. A full disk is always reported as such.
     fn from(error: WriteError) -> Self {
         match error {
             full if full.is_disk_full() => disk_full(full),
@@ -75,25 +75,25 @@ impl From<WriteError> for Failure {
     }
 }
 
-/// Returns the failure of a full disk: the same words and code wherever it fills.
+/// Returns the failure of a full disk, with the same message and exit code wherever it occurs.
 fn disk_full(what: impl Display) -> Failure {
     Failure::failed(format!("the disk is full: {what}; make room, or choose another"))
 }
 
-/// Returns true for an error of a disk without room.
+/// Returns true for the error of a full disk.
 fn is_full(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded)
 }
 
-/// Returns the failure of an output that cannot be made: the user may choose another (exit code 2),
-/// unless the disk is full, which is exit code 1 as it is later.
+/// Returns the failure for an output that cannot be created: the user may choose another (exit code
+/// 2), unless the disk is full, which gives exit code 1 as at any later time.
 pub fn refused(error: WriteError) -> Failure {
     if error.is_disk_full() { error.into() } else { Failure::usage(error) }
 }
 
 impl From<LogError> for Failure {
-    /// Converts the error of a log: a log that cannot be used is exit code 1, settings that cannot
-    /// are 2.
+    /// Converts the error of a log: exit code 1 for a log that cannot be used, 2 for invalid
+    /// settings.
     fn from(error: LogError) -> Self {
         match error {
             LogError::Settings(_)
@@ -108,13 +108,13 @@ impl From<LogError> for Failure {
 /// Result of a command.
 pub type Outcome = Result<Ended, Failure>;
 
-/// Remedy for a folder of results that cannot be made.
+/// Remedy for a folder of results that cannot be created.
 pub const ANOTHER_OUTPUT: &str = "choose another with -o";
 
-/// Makes a folder for results, with its parents.
+/// Creates a folder for results, with its parents.
 ///
 /// # Errors
-/// A folder that cannot be made there is the user's to change: exit code 2.
+/// A folder that cannot be created there, which the user can change: exit code 2.
 pub fn make_folder(folder: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(folder).map_err(|error| {
         let why = format!("cannot make the folder {}: {error}", folder.display());
@@ -126,7 +126,7 @@ pub fn make_folder(folder: &Path) -> Result<(), Failure> {
     })
 }
 
-/// Writes a whole file, and makes its folder.
+/// Writes a whole file, and creates its folder.
 ///
 /// # Errors
 /// As for [`make_folder`]; a file that cannot be written: exit code 1.
@@ -136,12 +136,12 @@ pub fn write_file(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Failure>
         .map_err(|source| WriteError::Io { path: path.to_owned(), source }.into())
 }
 
-/// Makes the parent folder of a file.
+/// Creates the parent folder of a file.
 pub fn make_room_for(file: &Path) -> Result<(), Failure> {
     file.parent().filter(|folder| !folder.as_os_str().is_empty()).map_or(Ok(()), make_folder)
 }
 
-/// Refuses to replace an existing file without `overwrite`.
+/// Refuses to replace an existing file unless `overwrite` is set.
 ///
 /// # Errors
 /// An existing file: exit code 2.
@@ -155,12 +155,13 @@ pub fn spare(file: &Path, overwrite: bool) -> Result<(), Failure> {
 }
 
 /// Message after a signal ended the writing of a log.
-pub const CUT_SHORT: &str = "stopped; the log is whole, but ends early";
+pub const CUT_SHORT: &str = "stopped; the log is valid, but ends early";
 
-/// Returns a text without characters that steer a terminal: names in a log come from anywhere.
+/// Returns a text without the characters that control a terminal, because names in a log may come
+/// from anywhere.
 fn harmless(text: &str) -> Cow<'_, str> {
     fn steers(c: char) -> bool {
-        // The second part turns the direction of writing round.
+        // The second part changes the direction of writing.
         (c.is_control() && !matches!(c, '\n' | '\t'))
             || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
     }
@@ -175,12 +176,13 @@ fn harmless(text: &str) -> Cow<'_, str> {
     )
 }
 
-/// Prints to stdout. A closed pipe is a quiet end.
+/// Prints to stdout. A closed pipe ends the command silently.
 ///
 /// # Errors
-/// A stdout that cannot be written: exit code 1.
+/// If stdout cannot be written: exit code 1.
 pub fn print(text: &str) -> Result<(), Failure> {
-    // Flushed here, so that a full disk or a closed pipe is noticed before the exit code is chosen.
+    // Flushed here, so that a full disk or a closed pipe is noticed before the exit code is
+    // determined.
     let mut out = io::stdout().lock();
     let written = io::Write::write_all(&mut out, harmless(text).as_bytes())
         .and_then(|()| io::Write::flush(&mut out));
@@ -193,7 +195,6 @@ pub fn print(text: &str) -> Result<(), Failure> {
 
 /// Prints a line to stderr.
 pub fn say(text: &str) {
-    // A failed stderr leaves no place to report the failure.
     // One write for the whole line, so that lines of several threads do not mix.
     let line = format!("{}\n", harmless(text));
     let _ = io::Write::write_all(&mut io::stderr().lock(), line.as_bytes());

@@ -10,12 +10,12 @@ use indicatif::{ProgressBar, ProgressStyle};
 use crate::outcome::say;
 use tagalong_math::counted;
 
-/// Time between two pictures of a spinner.
+/// Time between two frames of a spinner.
 const TICK: Duration = Duration::from_millis(100);
-/// Steps of the bar.
+/// Number of steps of the bar.
 const STEPS: u64 = 1000;
 
-/// Progress bar, visible only where stderr is a terminal.
+/// Progress bar, which is visible only if stderr is a terminal.
 pub struct Progress {
     bar: ProgressBar,
     title: String,
@@ -33,7 +33,7 @@ impl Progress {
         Self::titled("")
     }
 
-    /// Returns a bar at its beginning, with a word that says which of several passes it is.
+    /// Returns a bar at its beginning, with a title that distinguishes several passes.
     pub fn titled(title: &str) -> Self {
         let bar = ProgressBar::new(STEPS);
         if let Ok(style) = ProgressStyle::with_template("{wide_bar} {percent:>3}% {msg} {eta}") {
@@ -43,18 +43,18 @@ impl Progress {
         Self { bar, title }
     }
 
-    /// Shows what is done, of unknown duration, while it is done.
+    /// Shows a message with a spinner while work of unknown duration is done.
     pub fn waiting<T>(message: &str, work: impl FnOnce() -> T) -> T {
         let spinner = ProgressBar::new_spinner().with_message(message.to_owned());
         let (ends, ended) = channel();
         let done = thread::scope(|scope| {
             if !spinner.is_hidden() {
                 let spinner = &spinner;
-                // Without another thread it stands still, and the work goes on.
+                // If a thread cannot be started, the spinner does not turn, but the work continues.
                 let _ =
                     thread::Builder::new().spawn_scoped(scope, move || turn_until(&ended, spinner));
             }
-            // Dropped at the end of the work, also by a panic.
+            // Dropped at the end of the work, even after a panic.
             let _ends: Sender<()> = ends;
             work()
         });
@@ -67,7 +67,7 @@ impl Progress {
         self.tell(fraction, format!("{}frame {frame}, {people} in view", self.title));
     }
 
-    /// Shows the progress of a pass of several pipelines, or of none.
+    /// Shows the progress of a pass with several pipelines, or with none.
     pub fn advance(&self, fraction: f64, frame: u64) {
         self.tell(fraction, format!("{}frame {frame}", self.title));
     }
@@ -84,17 +84,17 @@ impl Drop for Progress {
     }
 }
 
-/// Turns a spinner until the other end of the channel is gone.
+/// Turns a spinner until the other end of the channel is dropped.
 fn turn_until(ended: &Receiver<()>, spinner: &ProgressBar) {
     while ended.recv_timeout(TICK) == Err(RecvTimeoutError::Timeout) {
         spinner.tick();
     }
 }
 
-/// Duration from which on it is told beforehand.
+/// Duration from which on a forecast is reported.
 const LONG: Duration = Duration::from_secs(60);
 
-/// Forecast of the time of many tasks, told once, also where no bar is visible.
+/// Forecast of the time of many tasks, reported once, even if no bar is visible.
 pub struct Forecast {
     total: u64,
     kind: &'static str,
@@ -105,7 +105,7 @@ pub struct Forecast {
 }
 
 impl Forecast {
-    /// Begins, and says how many tasks there are.
+    /// Starts a forecast, and reports the number of tasks.
     pub fn new(total: usize, kind: &'static str) -> Self {
         if total > 1 {
             say(&format!("{total} {kind}"));
@@ -115,13 +115,13 @@ impl Forecast {
         Self { total: total as u64, kind, done, start: Instant::now(), told }
     }
 
-    /// Notes that a task is done; after one in twenty it says how long all will take, if that is
-    /// more than a minute.
+    /// Notes that a task is done. After one in twenty it reports how long all of them will take, if
+    /// that is more than a minute.
     pub fn advance(&self) {
         self.advance_by(1);
     }
 
-    /// Notes that so many tasks are done, which ended together: their time is that of all of them.
+    /// Notes that this number of tasks ended together: their time is that of all of them.
     pub fn advance_by(&self, count: usize) {
         if let Some(sentence) = self.sentence_after(count, self.start.elapsed()) {
             say(&sentence);
@@ -139,7 +139,7 @@ impl Forecast {
     }
 }
 
-/// Returns the forecast in words; none for less than a minute.
+/// Returns the forecast in words; `None` for less than a minute.
 fn sentence(done: u64, total: u64, took: Duration, kind: &str) -> Option<String> {
     let left = took.mul_f64(total.saturating_sub(done) as f64 / done.max(1) as f64);
     let minutes = counted((left.as_secs_f64() / 60.0).ceil() as u64, "minute");

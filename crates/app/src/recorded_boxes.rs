@@ -1,4 +1,4 @@
-//! Files of boxes that a config replays, as `recorded` does.
+//! Files of boxes that a config replays, as the config `recorded` does.
 
 use std::collections::BTreeSet;
 
@@ -12,7 +12,7 @@ use crate::config_file::ConfigFile;
 pub struct RecordedBoxes {
     /// The file, as the config names it.
     pub name: String,
-    /// True if its boxes have IDs, as those of tracks.
+    /// True if its boxes have IDs, like those of tracks.
     pub has_ids: bool,
 }
 
@@ -31,7 +31,7 @@ impl RecordedBoxes {
         found
     }
 
-    /// Returns a note on IDs that are passed over.
+    /// Returns a note on IDs that are ignored.
     pub fn note(&self) -> Option<String> {
         let name = &self.name;
         self.has_ids.then(|| {
@@ -46,8 +46,8 @@ impl RecordedBoxes {
     pub fn note_on_logs(&self, config: &str, logs: usize) -> Option<String> {
         (logs > 1).then(|| {
             format!(
-                "{config} takes the boxes of {} for all {logs} logs, and they are those of one: give each log \
-                 a config of its own, or score tracks with --tracks NAME=DIR",
+                "{config} takes the boxes of {} for all {logs} logs, but they belong to one: give \
+                 each log a config of its own, or score tracks with --tracks NAME=DIR",
                 self.name
             )
         })

@@ -8,10 +8,10 @@ use crate::frame_notes::MeasuredValue;
 use crate::outcome::Failure;
 use crate::serialize::to_toml;
 
-/// Table of the tests that are no plugin's.
+/// Table of the tests that do not belong to a plugin.
 const TABLE: &str = include_str!("remedies.toml");
 
-/// Settings that a sentence names at most: a reader tries one or two.
+/// Maximum number of settings in a sentence, because a reader tries one or two.
 const MOST_SETTINGS: usize = 2;
 
 /// Remedy for the candidates that a test drops.
@@ -20,7 +20,7 @@ const MOST_SETTINGS: usize = 2;
 pub struct Remedy {
     /// Name of the test; one that ends in `*` is a prefix.
     pub test: String,
-    /// Plugin that has the test and the settings; none for the pipeline's.
+    /// Plugin that has the test and the settings; `None` for those of the pipeline.
     #[serde(skip_serializing_if = "Option::is_none")]
     plugin: Option<String>,
     /// Keys of the settings.
@@ -29,10 +29,10 @@ pub struct Remedy {
     pub look: String,
 }
 
-/// Setting that is worth a trial on any log.
+/// Setting that is worth trying on any log.
 #[derive(Clone, Debug)]
 struct Offer {
-    /// Plugin that has the setting; none for a section of the pipeline.
+    /// Plugin that has the setting; `None` for a section of the pipeline.
     plugin: Option<&'static str>,
     /// Key of the setting, or name of the section.
     setting: &'static str,
@@ -40,18 +40,18 @@ struct Offer {
     values: Vec<Value>,
 }
 
-/// Other value of a setting.
+/// Change of a setting to another value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
     /// Dotted path in the resolved config.
     pub key: String,
     /// The value.
     pub value: Value,
-    /// The line of a config that says so.
+    /// The corresponding line of a config.
     pub line: String,
 }
 
-/// Remedies of the pipeline and of all plugins, and the settings that are worth a trial.
+/// Remedies of the pipeline and of all plugins, and the settings that are worth trying.
 #[derive(Clone, Debug)]
 pub struct Remedies {
     drop: Vec<Remedy>,
@@ -69,14 +69,14 @@ fn of_pipeline() -> Vec<Remedy> {
 }
 
 impl Default for Remedies {
-    /// Returns the remedies of the pipeline alone.
+    /// Returns only the remedies of the pipeline.
     fn default() -> Self {
         Self { drop: of_pipeline(), offers: Vec::new() }
     }
 }
 
 impl Remedies {
-    /// Collects the remedies of the pipeline, and what the plugins offer.
+    /// Collects the remedies of the pipeline and those of the plugins.
     pub fn new(registry: &Registry) -> Self {
         let of_plugins = registry.all_remedies().map(|(plugin, remedy)| Remedy {
             test: remedy.test.to_owned(),
@@ -111,13 +111,13 @@ impl Remedies {
         self.drop.iter().find(|remedy| remedy.is_for(test))
     }
 
-    /// Returns the remedy for a test in a resolved config: that of a plugin that the config has, or else
-    /// that of the pipeline.
+    /// Returns the remedy for a test in a resolved config: that of a plugin in the config, or
+    /// otherwise that of the pipeline.
     pub fn of_config(&self, test: &str, resolved: &Table) -> Option<&Remedy> {
         self.drop.get(self.place_of(test, resolved)?)
     }
 
-    /// Returns the position of [`Remedies::of_config`] among all remedies.
+    /// Returns the index of the remedy of [`Remedies::of_config`] among all remedies.
     fn place_of(&self, test: &str, resolved: &Table) -> Option<usize> {
         let of_plugin = self.drop.iter().position(|remedy| {
             remedy.plugin.is_some()
@@ -127,15 +127,16 @@ impl Remedies {
         of_plugin.or_else(|| self.drop.iter().position(|remedy| remedy.is_for(test)))
     }
 
-    /// Returns the sentence that says why a test dropped a person, and the settings that decide it, by
-    /// which each page and `doctor` explain it. Settings are those of a resolved config, two at most.
+    /// Returns the sentence that explains why a test dropped a person, with the settings of the
+    /// test; every page and `doctor` use it. The settings are those of a resolved config, at most
+    /// two.
     pub fn sentence(&self, test: &str, resolved: &Table) -> String {
         let decided = self.decided(test, resolved);
         format!("the test \"{test}\" dropped the candidate{decided}")
     }
 
-    /// Returns the sentence about a candidate whose value is known: the value against its limits, and the
-    /// settings with which it passes the test, two at most.
+    /// Returns the sentence about a candidate whose value is known: the value compared with its
+    /// limits, and the settings with which it would pass the test, at most two.
     pub fn sentence_measured(
         &self,
         test: &str,
@@ -168,8 +169,8 @@ impl Remedies {
         format!("the test \"{test}\" dropped the candidate, {}{decided}", measured.in_words())
     }
 
-    /// Returns the end of a sentence about a test: the settings that decide it, two at most, with the
-    /// advice on it; empty for a test that nothing is known about.
+    /// Returns the end of a sentence about a test: its settings, at most two, with the advice on
+    /// it; empty for a test about which nothing is known.
     pub fn decided(&self, test: &str, resolved: &Table) -> String {
         let Some(remedy) = self.of_config(test, resolved) else { return String::new() };
         let mut found = remedy.settings_in(resolved);
@@ -187,9 +188,9 @@ impl Remedies {
         format!("; {settings}: {}", remedy.look)
     }
 
-    /// Returns the stage of a test in a resolved config: the candidates that it drops came nearer to a
-    /// track than those of a lower stage. Tests of detectors come first, in the order of their tables;
-    /// then those that no table has, those of the pipeline, and those of its other plugins.
+    /// Returns the stage of a test in a resolved config: candidates that are dropped in a later
+    /// stage came closer to a track. Tests of detectors come first, in the order of their tables;
+    /// then those that no table contains, those of the pipeline, and those of its other plugins.
     pub fn stage(&self, test: &str, resolved: &Table) -> usize {
         let all = self.drop.len();
         let Some(place) = self.place_of(test, resolved) else { return all };
@@ -199,8 +200,8 @@ impl Remedies {
         if is_detectors { place } else { all + 1 + place }
     }
 
-    /// Returns the changes of a resolved config that are offered for its plugins; none of them has
-    /// the present value.
+    /// Returns the changes of a resolved config that its plugins offer; none of them has the
+    /// present value.
     pub fn offered(&self, resolved: &Table) -> Vec<Change> {
         self.offers.iter().flat_map(|offer| offer.changes(resolved)).collect()
     }
@@ -225,8 +226,7 @@ impl Remedies {
     }
 }
 
-/// Returns the section of a config that names the one plugin of a kind; `None` for kinds of which
-/// there are several.
+/// Returns the section of a config for the plugin of a kind; `None` for kinds with several plugins.
 fn section_of(kind: Kind) -> Option<&'static str> {
     match kind {
         Kind::Associator => Some("associator"),
@@ -268,7 +268,7 @@ fn keys_of<'a>(
 /// Section of a resolved config: a table, or an entry of a list of tables.
 pub(crate) struct Section<'a> {
     pub(crate) name: &'a str,
-    /// Position in the list; none for a table that is no entry.
+    /// Index in the list; `None` for a table that is not in a list.
     at: Option<usize>,
     table: &'a Table,
 }
@@ -284,12 +284,12 @@ pub(crate) fn sections(resolved: &Table) -> impl Iterator<Item = Section<'_>> {
 }
 
 impl<'a> Section<'a> {
-    /// Returns the name of its plugin, if it has one.
+    /// Returns the name of the section's plugin, if it has one.
     pub(crate) fn plugin(&self) -> Option<&'a str> {
         self.table.get("plugin").and_then(Value::as_str)
     }
 
-    /// Returns the value of a setting of its plugin.
+    /// Returns the value of a setting of the section's plugin.
     pub(crate) fn setting(&self, key: &str) -> Option<&'a Value> {
         self.table.get("config")?.get(key)
     }
@@ -302,7 +302,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// Returns the header that leads to the section; an entry of a list has its path instead.
+    /// Returns the header of the section; for an entry of a list its path instead.
     fn header(&self) -> String {
         match self.at {
             Some(_) => self.path(),
@@ -311,15 +311,15 @@ impl<'a> Section<'a> {
     }
 }
 
-/// Returns the largest depth at which the detectors of a resolved config look for people, m; `None` where
-/// none has such a limit.
+/// Returns the largest depth at which the detectors of a resolved config look for people, m; `None`
+/// if none has such a limit.
 pub fn reach_m(resolved: &Table) -> Option<f64> {
     let detectors = sections(resolved).filter(|section| section.name == "detectors");
     let limits = detectors.filter_map(|section| section.setting("max_depth_m").and_then(number));
     limits.reduce(f64::max)
 }
 
-/// Returns the value of a setting with which a candidate passes, to a hundredth.
+/// Returns the value of a setting with which a candidate would pass, to a hundredth.
 fn passing_value(measured: &MeasuredValue, limit: f64, now: &Value) -> Value {
     let parts = if now.is_integer() { 1.0 } else { 100.0 };
     let below = (measured.value * parts).floor();
@@ -332,14 +332,14 @@ pub fn number(value: &Value) -> Option<f64> {
     value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
 }
 
-/// Returns true if a value, or each part of it that is given, is the present one.
+/// Returns true if a value, or each part of it that is given, equals the present one.
 pub fn is_present(value: &Value, now: &Value) -> bool {
     match (value, now) {
         (Value::Table(value), Value::Table(now)) => {
             value.iter().all(|(key, value)| now.get(key).is_some_and(|now| is_present(value, now)))
         }
         (value, now) => match (number(value), number(now)) {
-            // Equal to more digits than a config is written with.
+            // Equal to more digits than are written in a config.
             (Some(a), Some(b)) => (a - b).abs() <= 1e-9 * a.abs().max(1.0),
             _ => value == now,
         },
@@ -358,7 +358,7 @@ impl Change {
 fn line(resolved: &Table, key: &str, value: &Value) -> String {
     let parts: Vec<&str> = key.split('.').collect();
     match parts[..] {
-        // As in a config that extends this one.
+        // Written as in a config that extends this one.
         [section, at, "config", ref rest @ ..] if at.parse::<usize>().is_ok() => {
             let item = at.parse::<usize>().ok().and_then(|at| resolved.get(section)?.get(at));
             let plugin = item.and_then(|item| item.get("plugin")).and_then(Value::as_str);
@@ -386,7 +386,8 @@ impl Remedy {
             .map_or(self.test == test, |beginning| test.starts_with(beginning))
     }
 
-    /// Returns true for a section with a setting of this value, of the remedy's plugin if it has one.
+    /// Returns true for a section that has a setting with this value and, if the remedy has a
+    /// plugin, belongs to that plugin.
     fn has_limit(&self, section: &Section<'_>, key: &str, limit: f64) -> bool {
         let is_own = self.plugin.is_none() || self.plugin.as_deref() == section.plugin();
         let now = section.setting(key).filter(|_| is_own);
@@ -433,27 +434,28 @@ impl Remedy {
     }
 }
 
-/// Setting with its place in a config.
+/// Setting with its position in a config.
 struct Setting {
     /// Header of the section, or the path of an entry.
     section: String,
-    /// True where the section is an entry of a list.
+    /// True if the section is an entry of a list.
     is_entry: bool,
-    /// Plugin that has the setting; none for the pipeline's.
+    /// Plugin that has the setting; `None` for a setting of the pipeline.
     plugin: Option<String>,
     /// Key and value.
     assignment: String,
 }
 
 impl Setting {
-    /// Returns settings in the syntax of a config; those of one section and plugin are one line.
+    /// Returns settings in the syntax of a config; those of the same section and plugin are on one
+    /// line.
     fn in_words(settings: &[Self]) -> String {
         let lines = settings.chunk_by(|a, b| a.section == b.section && a.plugin == b.plugin);
         lines.map(Self::line).collect::<Vec<_>>().join(" and ")
     }
 
-    /// Returns the line of settings of one section and plugin; those of an entry of a list as a config
-    /// that extends this one changes them.
+    /// Returns the line with settings of one section and plugin; for an entry of a list, written as
+    /// in a config that extends this one.
     fn line(settings: &[Self]) -> String {
         let Some(Self { section, is_entry, plugin, .. }) = settings.first() else {
             return String::new();

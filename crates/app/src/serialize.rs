@@ -1,4 +1,4 @@
-//! Values as text, with a failure that names what could not be written.
+//! Serialisation of values as text, with a failure that names the value.
 
 use std::fmt::Display;
 
@@ -6,17 +6,17 @@ use serde::Serialize;
 
 use crate::outcome::Failure;
 
-/// Returns a value as indented JSON, with a line end.
+/// Returns a value as indented JSON, with a newline.
 ///
 /// # Errors
-/// A value that JSON cannot express, such as a map whose keys are no texts: exit code 1, with the
-/// `name` of the value.
+/// A value that cannot be written as JSON, such as a map whose keys are not text: exit code 1, with
+/// the `name` of the value.
 pub fn to_json<T: Serialize + ?Sized>(name: &str, value: &T) -> Result<String, Failure> {
     let text = serde_json::to_string_pretty(value).map_err(|why| failed(name, "JSON", why))?;
     Ok(text + "\n")
 }
 
-/// Returns a value as JSON in one line, with a line end.
+/// Returns a value as JSON on one line, with a newline.
 pub fn to_json_line<T: Serialize + ?Sized>(name: &str, value: &T) -> Result<String, Failure> {
     let text = serde_json::to_string(value).map_err(|why| failed(name, "JSON", why))?;
     Ok(text + "\n")
@@ -25,7 +25,7 @@ pub fn to_json_line<T: Serialize + ?Sized>(name: &str, value: &T) -> Result<Stri
 /// Returns a value as TOML.
 ///
 /// # Errors
-/// A value that TOML cannot express, such as a text outside of a table: exit code 1, with the
+/// A value that cannot be written as TOML, such as a text outside of a table: exit code 1, with the
 /// `name` of the value.
 pub fn to_toml<T: Serialize + ?Sized>(name: &str, value: &T) -> Result<String, Failure> {
     toml::to_string(value).map_err(|why| failed(name, "TOML", why))

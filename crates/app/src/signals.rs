@@ -1,4 +1,4 @@
-//! Signals that ask a command to stop.
+//! Signals that request a command to stop.
 
 use std::io;
 use std::sync::Arc;
@@ -19,10 +19,10 @@ pub struct Signals {
 }
 
 impl Signals {
-    /// Listens from now on.
+    /// Starts listening.
     ///
     /// # Errors
-    /// The system refuses the handler: exit code 1.
+    /// If the system rejects the handler: exit code 1.
     pub fn listen() -> Result<Self, Failure> {
         Self::register()
             .map_err(|error| Failure::failed(format!("cannot listen for signals: {error}")))
@@ -32,7 +32,7 @@ impl Signals {
         let signals = Self::default();
         let impatient = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM] {
-            // In this order: at the first signal the flag is not yet set.
+            // The order matters: at the first signal the flag is not set yet.
             flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&impatient))?;
             flag::register(signal, Arc::clone(&impatient))?;
             flag::register_usize(signal, Arc::clone(&signals.received), signal as usize)?;
@@ -40,12 +40,12 @@ impl Signals {
         Ok(signals)
     }
 
-    /// Asks to stop, as SIGINT does.
+    /// Requests a stop, as SIGINT does.
     pub fn interrupt(&self) {
         self.received.store(SIGINT as usize, Ordering::Relaxed);
     }
 
-    /// Returns the signal that asked to stop, if there was one.
+    /// Returns the signal that requested a stop, if there was one.
     pub fn received(&self) -> Option<u8> {
         u8::try_from(self.received.load(Ordering::Relaxed)).ok().filter(|signal| *signal != 0)
     }

@@ -11,18 +11,18 @@ use crate::config_file::ConfigFile;
 use crate::installed::installed_configs;
 use crate::outcome::Failure;
 
-/// Endings of logs.
+/// Extensions of logs.
 pub const LOG_ENDINGS: [&str; 3] = ["mcap", "db3", "bag"];
 
-/// First bytes of MCAP files, of SQLite files and of ROS 1 bags.
+/// Magic bytes of MCAP files, of SQLite files and of ROS 1 bags.
 const LOG_MAGICS: [&[u8]; 3] = [b"\x89MCAP", b"SQLite format 3\0", b"#ROSBAG"];
 /// Length of the longest of [`LOG_MAGICS`], bytes.
 const LONGEST_MAGIC: u64 = 16;
 
-/// Returns "; did you mean `configs/depth-ekf.toml`?", or the names of the configs that there are. A
-/// single path that is no config may also be a mistyped log.
+/// Returns "; did you mean `configs/depth-ekf.toml`?", or the names of the existing configs. A
+/// single path that is not a config may also be a mistyped log.
 pub fn config_hint(wanted: &Path) -> String {
-    // A config has the ending `toml` or, being built in, none.
+    // A config has the extension `toml` or, if it is built in, none.
     let is_config = wanted.extension().is_none_or(|ending| ending == "toml");
     if let Some(log) = nearest_log(wanted).filter(|_| !is_config) {
         return format!("; did you mean the log `{}`?", log.display());
@@ -39,7 +39,8 @@ pub fn config_hint(wanted: &Path) -> String {
     }
     let best = nearest(stem, names.iter().chain(&built_in).copied());
     let Some(best) = best else {
-        // Of a folder that was named all files may be meant; TOML files lie about in many others.
+        // If a folder was named, all of its files are candidates; many other folders contain
+        // unrelated TOML files.
         let named = if folders[0].as_os_str().is_empty() { &[][..] } else { &names };
         let mut known: Vec<&str> = named.iter().chain(&built_in).copied().collect();
         known.extend(installed.iter().map(String::as_str));
@@ -53,7 +54,7 @@ pub fn config_hint(wanted: &Path) -> String {
     }
 }
 
-/// Returns the problem and the remedy of a log or a network in the place of a config; `None` for any
+/// Returns the problem and the remedy for a log or a network in place of a config; `None` for any
 /// other path.
 pub fn not_a_config(path: &Path) -> Option<String> {
     let shown = path.display();
@@ -74,7 +75,7 @@ pub fn not_a_config(path: &Path) -> Option<String> {
     })
 }
 
-/// Returns true for a file that begins as the files of recorders do.
+/// Returns true for a file that begins like those of recorders.
 fn starts_as_log(path: &Path) -> bool {
     let Ok(file) = File::open(path) else { return false };
     let mut start = Vec::new();
@@ -82,14 +83,14 @@ fn starts_as_log(path: &Path) -> bool {
     read.is_ok() && LOG_MAGICS.iter().any(|magic| start.starts_with(magic))
 }
 
-/// Returns the config of an installed network whose name is nearest to a mistyped one; `None` if that
-/// of another config is as near.
+/// Returns the config of an installed network whose name is most similar to a mistyped one; `None`
+/// if that of another config is as similar.
 fn nearest_installed<'a>(
     wanted: &str,
     installed: &'a [String],
     others: impl Iterator<Item = &'a str>,
 ) -> Option<&'a str> {
-    // Of names that are equally near the first one is taken.
+    // Of equally similar names the first one is taken.
     let best = nearest(wanted, others.chain(installed.iter().map(String::as_str)))?;
     installed.iter().map(String::as_str).find(|name| *name == best)
 }
@@ -108,7 +109,7 @@ pub fn toml_files(folder: &Path) -> Vec<PathBuf> {
         .collect()
 }
 
-/// Refuses a path that cannot be a log, with a remedy.
+/// Rejects a path that cannot be a log, with a remedy.
 ///
 /// # Errors
 /// A missing file, the folder of a run, or a directory that is not one log.
@@ -145,7 +146,7 @@ pub fn is_run(folder: &Path) -> bool {
     ["tracks.mcap", "report.json"].iter().all(|name| folder.join(name).is_file())
 }
 
-/// Returns the runs in a folder, by name; none for a path that is no folder.
+/// Returns the runs in a folder, by name; empty for a path that is not a folder.
 pub fn runs_in(folder: &Path) -> Vec<PathBuf> {
     let mut runs = files_in(folder).unwrap_or_default();
     runs.retain(|path| is_run(path));
@@ -177,20 +178,20 @@ fn log_hint(wanted: &Path) -> String {
         .map_or(String::new(), |best| format!("; did you mean `{}`?", best.display()))
 }
 
-/// Returns the log whose name is nearest to that of a missing file, in the same folder.
+/// Returns the log in the same folder whose name is most similar to that of a missing file.
 fn nearest_log(wanted: &Path) -> Option<PathBuf> {
     nearest_file(wanted, |ending| LOG_ENDINGS.contains(&ending))
 }
 
-/// Returns "; did you mean `LOG.people.csv`?" for a missing file, or nothing if no file in its folder
+/// Returns "; did you mean `LOG.people.csv`?" for a missing file; empty if no file in its folder
 /// has a similar name.
 pub fn file_hint(wanted: &Path) -> String {
     nearest_file(wanted, |_| true)
         .map_or(String::new(), |best| format!("; did you mean `{}`?", best.display()))
 }
 
-/// Returns the file whose name is nearest to that of a missing one, among those in its folder whose
-/// ending is accepted.
+/// Returns the file with an accepted extension whose name is most similar to that of a missing file
+/// in the same folder.
 fn nearest_file(wanted: &Path, accepts: impl Fn(&str) -> bool) -> Option<PathBuf> {
     let folder = wanted.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let files = files_in(folder).unwrap_or_default();
@@ -200,19 +201,19 @@ fn nearest_file(wanted: &Path, accepts: impl Fn(&str) -> bool) -> Option<PathBuf
     Some(wanted.with_file_name(best))
 }
 
-/// Returns what is in a folder, by name.
+/// Returns the entries of a folder, by name.
 ///
 /// # Errors
 /// A folder that cannot be read.
 fn files_in(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let mut files: Vec<PathBuf> =
         fs::read_dir(folder)?.flatten().map(|entry| entry.path()).collect();
-    // The order of a directory depends on the file system.
+    // The order of directory entries depends on the file system.
     files.sort();
     Ok(files)
 }
 
-/// Returns the ending of a file in lower case.
+/// Returns the extension of a file in lower case.
 fn ending_of(file: &Path) -> Option<String> {
     Some(file.extension()?.to_str()?.to_lowercase())
 }

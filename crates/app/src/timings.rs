@@ -10,10 +10,10 @@ pub const WHOLE_FRAME: &str = "whole frame";
 /// Resolution of times, ms.
 const SHORTEST_MS: f64 = 1e-3;
 
-/// Ratio of the ends of neighbouring bins: figures are right to 1 %.
+/// Ratio between the ends of a bin: figures are accurate to 1 %.
 const RATIO: f64 = 1.02;
 
-/// Bins, up to about an hour.
+/// Number of bins, up to about an hour.
 const BINS: usize = 1120;
 
 /// Times of the stages, in memory that does not grow with the log.
@@ -68,21 +68,21 @@ impl Timings {
     }
 }
 
-/// Returns the sentence about a pipeline that takes longer for a frame than the time to the next one, in
-/// wall time; `None` for one that keeps up, and where either time is not known.
+/// Returns a sentence about a pipeline that takes longer for a frame than the time to the next one,
+/// in wall time; `None` if it keeps up, or if either time is not known.
 pub fn too_slow(frame_ms: f64, period_ms: f64) -> Option<String> {
     let is_slow = period_ms > 0.0 && frame_ms > period_ms && frame_ms.is_finite();
     is_slow.then(|| {
         format!(
-            "on this computer {} of {} frames a second ({frame_ms:.0} ms of wall time each, one is there every \
-             {period_ms:.0} ms): live, the others are skipped",
+            "on this computer {} of {} frames per second ({frame_ms:.0} ms of wall time each, one \
+             arrives every {period_ms:.0} ms): live, the others are skipped",
             per_second(frame_ms),
             per_second(period_ms)
         )
     })
 }
 
-/// Returns a rate in words: whole from ten on.
+/// Returns a rate in words; an integer from ten on.
 fn per_second(ms: f64) -> String {
     let hz = 1e3 / ms;
     if hz < 9.95 { format!("{hz:.1}") } else { format!("{hz:.0}") }
@@ -94,7 +94,7 @@ impl Histogram {
     }
 
     fn add(&mut self, ms: f64) {
-        // Logarithmic bins have the same relative error at every length of time.
+        // Logarithmic bins have the same relative error for all durations.
         let bin = (ms / SHORTEST_MS).max(1.0).ln() / RATIO.ln();
         self.counts[(bin as usize).min(BINS - 1)] += 1;
         self.sum_ms += ms;
@@ -113,14 +113,14 @@ impl Histogram {
         }
     }
 
-    /// Returns the middle of the bin in which the quantile lies.
+    /// Returns the middle of the bin that contains the quantile.
     fn quantile(&self, frames: u64, fraction: f64) -> f64 {
         let rank = (fraction * frames as f64).ceil() as u64;
         let mut seen = 0;
         for (bin, count) in self.counts.iter().enumerate() {
             seen += count;
             if seen >= rank {
-                // The middle of the last bin may lie above all times.
+                // The middle of the last bin may exceed all times.
                 return (SHORTEST_MS * RATIO.powf(bin as f64 + 0.5)).min(self.max_ms);
             }
         }
@@ -168,7 +168,7 @@ mod tests {
     fn a_pipeline_that_is_slower_than_the_log_is_told_with_both_rates() {
         let told = too_slow(512.0, 40.0).expect("a slow one");
         assert!(
-            told.starts_with("on this computer 2.0 of 25 frames a second (512 ms of"),
+            told.starts_with("on this computer 2.0 of 25 frames per second (512 ms of"),
             "{told}"
         );
         for (frame_ms, period_ms) in [(40.0, 40.0), (10.0, 40.0), (10.0, 0.0), (f64::NAN, 40.0)] {

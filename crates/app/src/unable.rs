@@ -1,15 +1,15 @@
-//! Pipelines with a detector that can detect nothing on a log, whatever the log shows.
+//! Pipelines with a detector that cannot detect anything on a log, whatever the log shows.
 
 use crate::remedies::Remedies;
 
-/// Test of the funnel by which a detector says that it has no model.
+/// Test of the funnel by which a detector reports that it has no model.
 const NO_MODEL: &str = "no model";
 
-/// Test of the funnel by which a detector says that the camera of the log makes no panorama.
+/// Test of the funnel by which a detector reports that the camera of the log gives no panorama.
 const NO_PANORAMA: &str = "no panorama";
 
-/// Returns the reason for which a detector of a pipeline can detect nothing, with the remedy; `None`
-/// if there is none. `tests` are those of the funnel that dropped something.
+/// Returns the reason why a detector of a pipeline cannot detect anything, with the remedy; `None`
+/// if there is none. `tests` are the tests of the funnel that dropped candidates.
 pub fn unable<'a>(
     config: &str,
     tests: impl IntoIterator<Item = &'a str>,
@@ -29,8 +29,8 @@ pub fn unable<'a>(
         }
         if test == NO_PANORAMA {
             return Some(format!(
-                "{config}: a detector is for panoramas of a conical mirror, which the camera of the \
-                 log does not make, so {result}: take another config, as `tagalong run LOG` does, or \
+                "{config}: a detector needs panoramas of a conical mirror, but the camera of the \
+                 log makes none, so {result}: take another config, as `tagalong run LOG` does, or \
                  record a `camera_info` that says `conical_mirror`"
             ));
         }

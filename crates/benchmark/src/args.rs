@@ -74,8 +74,8 @@ pub struct PlanArgs {
     /// The pipelines [default: every config in configs that suits a log, or every built-in one].
     #[arg(long, num_args = 1.., value_name = "CONFIG")]
     pub configs: Vec<PathBuf>,
-    /// The logs; the truth of NAME.mcap is NAME.people.csv, NAME.truth.jsonl, NAME.boxes.csv,
-    /// NAME.people-floor.csv, or in the log.
+    /// The logs; the truth of NAME.mcap is in NAME.people.csv, NAME.truth.jsonl, NAME.boxes.csv,
+    /// NAME.people-floor.csv, or in the log itself.
     #[arg(long, num_args = 1.., value_name = "LOG")]
     pub logs: Vec<PathBuf>,
     /// Every log with truth in this folder.
@@ -85,8 +85,9 @@ pub struct PlanArgs {
     /// for each log, in a format that `eval` reads.
     #[arg(long, num_args = 1.., value_name = "NAME=DIR")]
     pub tracks: Vec<ForeignTracks>,
-    /// The rooms of the logs, as for --leave-one-room-out: which logs are single frames or of one room,
-    /// and the frames that are not scored. Without --logs and --logs-dir, all logs of the rooms are used.
+    /// The rooms of the logs, as for --leave-one-room-out: they state which logs are single frames
+    /// or of one room, and which frames are not scored. Without --logs and --logs-dir, all logs of
+    /// the rooms are used.
     #[arg(long, value_name = "ROOMS")]
     pub rooms: Option<PathBuf>,
     /// Runs each pipeline with this many seeds, counted from that of its config.
@@ -101,14 +102,15 @@ pub struct PlanArgs {
 /// Execution of the tasks.
 #[derive(Args, Clone, Debug)]
 pub struct RunArgs {
-    /// Tasks that run at once; the results are the same.
+    /// Number of tasks that run in parallel; it does not affect the results.
     #[arg(long, value_name = "N", default_value_t = 1,
           value_parser = clap::value_parser!(u16).range(1..=256))]
     pub jobs: u16,
     /// Only this task: its number in the plan, or its hash.
     #[arg(long, value_name = "K|HASH")]
     pub task: Option<String>,
-    /// Only part K of N, by logs: K, K + N, and so on of the plan's logs with all of their tasks.
+    /// Only part K of N, by logs: the logs K, K + N, and so on of the plan, with all of their
+    /// tasks.
     #[arg(long, value_name = "K/N", conflicts_with = "task")]
     pub shard: Option<Shard>,
     /// Run tasks again that failed before.
@@ -127,7 +129,7 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// Returns true if the log at this place of the plan, from 0, is of this part.
+    /// Returns true if the log with this index in the plan, from 0, belongs to this part.
     pub fn has(self, log: usize) -> bool {
         log % self.parts == self.part - 1
     }
@@ -187,7 +189,7 @@ impl BenchArgs {
         }
     }
 
-    /// Puts a note on the logs into the report.
+    /// Adds a note on the logs to the report.
     #[must_use]
     pub fn with_note(mut self, note: String) -> Self {
         self.report.notes.push(note);

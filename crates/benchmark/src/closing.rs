@@ -1,5 +1,5 @@
-//! Lines below the tables of a benchmark: means, the best two, reasons for skipped tasks, and what the
-//! logs cannot tell.
+//! Lines below the tables of a benchmark: means, the best two, reasons for skipped tasks, and
+//! limits of the logs.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -10,15 +10,15 @@ use tagalong_report::{Benchmark, Outcome, PipelineSummary, Summary, TaskResult};
 use super::plan::Task;
 use super::store::Stored;
 
-/// Most pipelines whose means are named in a line.
+/// Maximum number of pipelines whose means are listed in a line.
 const MOST_NAMED: usize = 8;
-/// Time between two frames from which on they may show other moments, s.
+/// Time between two frames from which on they count as separate moments, s.
 const FAR_APART_S: f64 = 1.0;
-/// Keys of the figure that ranks the pipelines, by precedence, with the place in words.
+/// Keys of the figure that ranks the pipelines, in order of precedence, with the place in words.
 const RANKING: [(&str, &str); 2] =
     [("image.HOTA", "in the image"), ("metres.HOTA", "on the floor")];
 
-/// Returns the means of the main figure, best first, and whether the best two differ.
+/// Returns the means of the main figure, best first, and whether the best two differ significantly.
 pub fn ranking(benchmark: &Benchmark) -> String {
     let summary = Summary::new(benchmark);
     let mut out = String::new();
@@ -57,7 +57,7 @@ pub fn ranking(benchmark: &Benchmark) -> String {
     out
 }
 
-/// Says whether two pipelines differ clearly, or how many logs that takes.
+/// States whether two pipelines differ significantly, or how many logs that takes.
 fn verdict(summary: &Summary, key: &str, names: [&String; 2]) -> String {
     let mut pairs = summary.pairs.iter().filter(|pair| pair.figure == key);
     let compared = pairs.clone().count();
@@ -99,7 +99,8 @@ pub fn skipped(tasks: &[TaskResult]) -> String {
     out
 }
 
-/// Returns notes on frames that are so far apart that little can be told of IDs, and on logs of one room.
+/// Returns notes on frames that are so far apart that IDs have little meaning, and on logs of the
+/// same room.
 pub fn notes(plan: &[Task], all: &[Stored]) -> Vec<String> {
     let mut apart: BTreeMap<&str, f64> = BTreeMap::new();
     let mut rooms: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
@@ -121,8 +122,8 @@ pub fn notes(plan: &[Task], all: &[Stored]) -> Vec<String> {
         .into_iter()
         .map(|(log, seconds)| {
             format!(
-                "{log}: frames are {seconds:.1} s apart: figures of IDs (HOTA, IDF1, switches) mean \
-                 little; `--rooms FILE` can say that they are single frames"
+                "{log}: frames are {seconds:.1} s apart: figures of IDs (HOTA, IDF1, switches) \
+                 mean little; `--rooms FILE` can mark such logs as single frames"
             )
         })
         .collect();
@@ -138,10 +139,10 @@ pub fn notes(plan: &[Task], all: &[Stored]) -> Vec<String> {
     notes
 }
 
-/// Names a result after its task; marks that of a log of single frames, and takes out of it what is
-/// tracked over them.
+/// Names a result after its task. For a log of single frames, it marks the result and removes the
+/// figures of tracking.
 pub fn with_facts(task: &Task, mut stored: Stored) -> Stored {
-    // Two configs that say the same share a result, which has the name of one of them.
+    // Two configs with the same settings share a result, which has the name of one of them.
     stored.result.pipeline.clone_from(&task.pipeline);
     if task.single_frames {
         let result = &mut stored.result;

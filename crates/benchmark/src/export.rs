@@ -1,4 +1,4 @@
-//! Results as the folder tree of TrackEval.
+//! Export of results as the folder tree of TrackEval.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -60,7 +60,7 @@ fn entry(name: &str, recording: Recording) -> (SequenceInfo, Sequence) {
     (SequenceInfo { name: name.to_owned(), rate_hz, length, width, height }, sequence)
 }
 
-/// Removes entries without a box: TrackEval compares boxes alone.
+/// Removes entries without a box, because TrackEval compares only boxes.
 fn boxes_only(frame: &mut Frame) {
     frame.truths.retain(|truth| truth.region.is_some());
     frame.reports.retain(|report| report.region.is_some());

@@ -1,4 +1,4 @@
-//! Tracks of other programs, scored beside the pipelines: `--tracks NAME=DIR`.
+//! Tracks of other programs, scored together with the pipelines: `--tracks NAME=DIR`.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -19,13 +19,13 @@ use super::store::{Store, Stored};
 use super::watch::{repaired, score_tracks};
 use super::work::{blank, failed, notes_on, truth_of};
 
-/// Endings of a file of tracks.
+/// Extensions of a file of tracks.
 const ENDINGS: [&str; 2] = ["txt", "csv"];
 /// Name of the input that is the file of tracks.
 pub const TRACKS: &str = "tracks";
-/// Cause of all misses of another program, and the sentence about it.
+/// Cause of all misses of another program, and the sentence for it.
 const CAUSE: &str = "tracks of another program";
-const WHY: &str = "of tracks of another program no dropped candidates are known";
+const WHY: &str = "the dropped candidates of another program are not known";
 
 impl ForeignTracks {
     /// Returns the task of scoring the tracks on a log.
@@ -68,11 +68,11 @@ pub fn is_foreign(task: &Task) -> bool {
     task.inputs.contains_key(TRACKS)
 }
 
-/// Scores tracks of other programs, log by log; `done` hears of each log how many tasks were done.
-/// Ends early after a stop signal.
+/// Scores tracks of other programs, log by log; `done` is called for each log with the number of
+/// finished tasks. Ends early after a stop signal.
 ///
 /// # Errors
-/// A disk that fails. Tracks that cannot be read are no error: their result says so.
+/// A failure of the disk. Tracks that cannot be read are not an error: their result states it.
 pub fn score_all(
     tasks: &[Task],
     store: &Store,
@@ -87,7 +87,7 @@ pub fn score_all(
         if signals.received().is_some() {
             return Ok(());
         }
-        // All trackers share the log and its truth, so these are hashed once.
+        // All trackers share the log and its truth, so these are hashed only once.
         let read = check_inputs(tasks[0], &[("log", log), ("truth", &tasks[0].truth)])
             .and_then(|()| Shots::read(log, &InputSettings::default(), &Limits::default()));
         for task in &tasks {
@@ -130,7 +130,8 @@ fn scored(task: &Task, shots: &Shots) -> Result<Stored, String> {
     Ok(Stored { result, recording: Some(recording), notes, ..Stored::default() })
 }
 
-/// Refuses files that changed since they were planned: the hash of the task covers them.
+/// Rejects files that have changed since they were planned, because the hash of the task covers
+/// them.
 fn check_inputs(task: &Task, files: &[(&str, &Path)]) -> Result<(), Failure> {
     for (name, path) in files {
         if task.inputs.get(*name) != Some(&sha256_of_file(path)?) {
@@ -143,7 +144,7 @@ fn check_inputs(task: &Task, files: &[(&str, &Path)]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Adds the people that no track matches, frame by frame, without a cause.
+/// Adds the people that match no track, frame by frame, without a cause.
 fn add_missed(
     sequence: &Sequence,
     truth: &TruthFile,

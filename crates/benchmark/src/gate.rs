@@ -13,7 +13,7 @@ use tagalong_report::{Benchmark, Outcome, TaskResult, figures};
 
 use super::args::GateArgs;
 
-/// Change of a figure that is not accepted.
+/// Rule for a change of a figure that is not accepted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rule {
     text: String,
@@ -56,7 +56,7 @@ impl Rule {
         Ok(Self { text: text.to_owned(), on_floor, figure: figure.to_owned(), below, bound })
     }
 
-    /// Returns the deterioration of a task, if there is one.
+    /// Returns a description of the deterioration of a task, if there is one.
     fn judge(&self, old: &TaskResult, new: &TaskResult) -> Option<String> {
         let [old, new] = [old, new].map(|task| {
             let scores = if self.on_floor { task.metres } else { task.image };
@@ -64,7 +64,8 @@ impl Rule {
         });
         match (old, new) {
             (None, _) => None,
-            // A figure that disappeared is a deterioration; one that never was cannot be judged.
+            // A figure that disappeared is a deterioration; one that never existed cannot be
+            // judged.
             (Some(old), None) => Some(format!("{}: was {old:.4}, is not there", self.text)),
             (Some(old), Some(new)) => {
                 let change = new - old;
@@ -75,7 +76,7 @@ impl Rule {
     }
 }
 
-/// The refusal of an argument of `--fail-if`.
+/// Returns the error for an invalid argument of `--fail-if`.
 fn refused_gate(text: &str, why: &str) -> Failure {
     Failure::usage(format!("--fail-if {text}: {why}"))
 }
@@ -98,7 +99,7 @@ impl Gate {
     }
 
     /// Returns a table of the deteriorations, if there are any. Tasks are the same if pipeline, log
-    /// and seed have the same names.
+    /// and seed agree.
     pub fn worse(&self, now: &Benchmark) -> Option<String> {
         let mut new: BTreeMap<_, _> = now.tasks.iter().map(|task| (key(task), task)).collect();
         let mut table = String::new();

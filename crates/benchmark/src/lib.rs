@@ -1,6 +1,6 @@
 //! `tagalong bench`: pipelines x logs x seeds, in separate steps.
 //!
-//! A plan lists tasks, each with a hash of everything that its result depends on. A result is a
+//! A plan lists tasks, each with a hash of everything on which its result depends. A result is a
 //! file named by that hash, so that running again costs nothing, several processes or machines can
 //! share a folder, and a changed config is never paired with an old result. A report only reads
 //! results.
@@ -55,7 +55,7 @@ use work::Tally;
 /// Runs `tagalong bench`.
 ///
 /// # Errors
-/// Files that cannot be read or written; tasks that failed; a gate that closed.
+/// Files that cannot be read or written; tasks that failed; a gate that was violated.
 pub fn bench(args: &BenchArgs, registry: &Registry) -> Outcome {
     match &args.step {
         None => everything(args, registry),
@@ -89,14 +89,14 @@ fn store(folder: &FolderArgs) -> Store {
     Store::new(&folder.output)
 }
 
-/// Runs all steps. A failed task does not keep the others from being reported.
+/// Runs all steps. A failed task does not prevent the others from being reported.
 fn everything(args: &BenchArgs, registry: &Registry) -> Outcome {
-    // The gate is read first: a wrong rule should not cost a whole benchmark.
+    // The gate is read first, so that an error in a rule does not cost a whole benchmark.
     let gate = Gate::read(&args.report.gate)?;
     make_plan(&args.plan, &args.folder, registry)?;
     let store = store(&args.folder);
     let tally = work::work(&args.run, &store, registry)?;
-    // A single task or shard has no complete set of results to report.
+    // A single task or shard does not have all results that a report needs.
     let is_whole = args.run.task.is_none() && args.run.shard.is_none();
     if tally.signal.is_none() && is_whole {
         make_report(&args.folder, &args.report, gate.as_ref())?;
@@ -128,7 +128,8 @@ fn make_report(folder: &FolderArgs, args: &ReportArgs, gate: Option<&Gate>) -> R
     }
 }
 
-/// Returns the end of a sentence on what was run: the number of results that were there already.
+/// Returns the end of a sentence on the tasks that were run: the number of results that existed
+/// before.
 fn earlier(count: usize) -> String {
     if count == 0 { String::new() } else { format!("; {count} had results of an earlier run") }
 }
@@ -150,12 +151,12 @@ fn verdict(tally: Tally, store: &Store) -> Outcome {
     }
 }
 
-/// Returns the message after a signal: the results that are kept, and the way to go on.
+/// Returns the message after a signal: which results are kept, and how to continue.
 fn stopped(done: usize, asked: &str, store: &Store) -> String {
     let folder = store.path("");
     format!(
         "stopped: {done} of {asked} have their results in {}, and there is no new report; the same \
-         command goes on with the others",
+         command continues with the others",
         folder.display()
     )
 }
@@ -180,7 +181,7 @@ mod tests {
     fn an_interrupted_benchmark_says_where_its_results_are_and_how_it_goes_on() {
         let told = stopped(3, "12 tasks", &Store::new(std::path::Path::new("out")));
         assert!(told.contains("3 of 12 tasks have their results in out"), "{told}");
-        assert!(told.contains("the same command goes on"), "{told}");
+        assert!(told.contains("the same command continues"), "{told}");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Recordings with which the shipped models and settings of a pipeline were made.
+//! Recordings that were used to make the shipped models and settings of a pipeline.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,7 @@ use toml::{Table, Value};
 
 use super::plan::Task;
 
-/// The table that is part of the program.
+/// The table, which is compiled into the program.
 const TABLE: &str = include_str!("../configs/models/made-with.toml");
 
 /// Recordings by models, plugins and configs.
@@ -23,21 +23,22 @@ struct MadeWith {
     configs: BTreeMap<String, Vec<String>>,
 }
 
-/// Built-in model of a plugin, or settings of it that were chosen with recordings.
+/// Built-in model of a plugin, or settings of a plugin that were chosen with recordings.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Model {
-    /// Name of the card of a model; settings have none.
+    /// Name of the model card; `None` for settings.
     card: Option<String>,
     plugin: String,
-    /// Settings that choose it among several.
+    /// Settings that select the model among several.
     #[serde(default)]
     with: Table,
     recordings: Vec<String>,
 }
 
 impl Model {
-    /// Returns true for a plugin that has these settings, and, of a model, that names none of its own.
+    /// Returns true for a plugin that has these settings and, for a model, does not name another
+    /// one.
     fn is_of(&self, plugin: &str, config: &Table) -> bool {
         let own = config.get("model").and_then(Value::as_str).unwrap_or_default();
         let is_chosen = self.with.iter().all(|(key, value)| config.get(key) == Some(value));
@@ -45,11 +46,11 @@ impl Model {
     }
 }
 
-/// Returns the hashes of the recordings with which the models and settings of a config were made, as
-/// far as they are shipped ones. `resolved` has every setting of the config.
+/// Returns the hashes of the recordings with which the shipped models and settings of a config were
+/// made. `resolved` has every setting of the config.
 ///
 /// # Errors
-/// None in a whole program: the table is part of it.
+/// None in an intact program, because the table is part of it.
 pub fn recordings_of(file: &ConfigFile, resolved: &Table) -> Result<BTreeSet<String>, Failure> {
     let table: MadeWith = toml::from_str(TABLE).map_err(Failure::failed)?;
     let mut names = BTreeSet::new();
@@ -81,7 +82,8 @@ impl MadeWith {
     }
 }
 
-/// Returns a note for each set of logs with which pipelines were made, with the names of these.
+/// Returns a note for each set of logs with which pipelines were made, with the names of these
+/// pipelines.
 pub fn notes<'a>(done: impl Iterator<Item = &'a Task>) -> Vec<String> {
     let mut logs_of: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
     for task in done.filter(|task| task.made_with_log) {
@@ -97,8 +99,8 @@ pub fn notes<'a>(done: impl Iterator<Item = &'a Task>) -> Vec<String> {
 fn note(logs: &BTreeSet<&str>, pipelines: &[&str]) -> String {
     let logs: Vec<&str> = logs.iter().copied().collect();
     format!(
-        "models or settings of {} were made with {}: figures there say little about another room, \
-         those of rooms left out are in docs/benchmarks.md",
+        "models or settings of {} were fitted to {}: figures there say little about other rooms; \
+         docs/benchmarks.md has those of rooms left out",
         pipelines.join(", "),
         logs.join(", ")
     )
@@ -251,8 +253,8 @@ mod tests {
         }
         let notes = notes(tasks.iter());
         let starts = [
-            "models or settings of c were made with lab, um:",
-            "models or settings of a, b were made with um:",
+            "models or settings of c were fitted to lab, um:",
+            "models or settings of a, b were fitted to um:",
         ];
         assert_eq!(notes.len(), 2, "{notes:?}");
         for (note, start) in notes.iter().zip(starts) {

@@ -22,7 +22,7 @@ pub fn add_missed(missed: Vec<Missed>, result: &mut TaskResult) {
     }
 }
 
-/// Most moments of one task that get an image.
+/// Maximum number of moments of one task that get an image.
 const MOST_MOMENTS: usize = 3;
 
 /// Returns the frames in the middle of the longest times in which a person is missed.

@@ -7,20 +7,20 @@ use tagalong_report::{Moment, TaskResult};
 
 use super::store::{Recording, Stored};
 
-/// Frames within which two moments of a log show the same.
+/// Number of frames within which two moments of a log count as the same.
 const SAME_FRAMES: u64 = 5;
 
-/// Most moments that are handed to the report, which shows as many as it has room for.
+/// Maximum number of moments that are passed to the report, which shows as many as it has room for.
 const MOST: usize = 60;
 
-/// Result with all that its pipeline said about each frame.
+/// Result with the output of its pipeline for each frame.
 struct Witness<'a> {
     result: &'a TaskResult,
     recording: &'a Recording,
     images: &'a BTreeMap<u64, String>,
 }
 
-/// Returns moments of all logs in turn, first those in which most pipelines miss somebody.
+/// Returns moments from all logs in turn, first those in which most pipelines miss a person.
 pub fn gather(stored: &[Stored]) -> Vec<Moment> {
     let mut by_log: BTreeMap<&str, Vec<Witness<'_>>> = BTreeMap::new();
     for Stored { result, recording, images, .. } in stored {
@@ -31,7 +31,7 @@ pub fn gather(stored: &[Stored]) -> Vec<Moment> {
     for witnesses in by_log.into_values() {
         all.extend(of_log(&witnesses).into_iter().enumerate());
     }
-    // The sort is stable: of the same rank the logs stay in the order of their names.
+    // The sort is stable: within the same rank the logs stay sorted by name.
     all.sort_by_key(|(rank, _)| *rank);
     all.into_iter().map(|(_, moment)| moment).take(MOST).collect()
 }
@@ -64,7 +64,7 @@ fn moment(witnesses: &[Witness<'_>], number: u64) -> Option<Moment> {
             let reports = frame.reports.iter();
             reports.filter_map(|r| Some((r.id, corners(&r.region?)))).collect::<Vec<_>>()
         });
-        // Of several seeds the first stands for its pipeline, as in the charts.
+        // If there are several seeds, the first represents its pipeline, as in the charts.
         tracks.entry(witness.result.pipeline.clone()).or_insert(boxes.unwrap_or_default());
     }
     Some(Moment {

@@ -15,14 +15,14 @@ use super::misses::moments;
 use super::store::Stored;
 use super::watch::importance;
 
-/// Most pictures of one task.
+/// Maximum number of pictures of one task.
 const MOST: usize = 40;
 
 /// Longer side of a picture, pixels.
 const SIDE: usize = 96;
 
-/// Width of the images of moments, pixels, and their quality: people are recognised, and an image has
-/// some 25 kB.
+/// Width of the images of moments, pixels, and their quality: people are recognisable, and an image
+/// takes some 25 kB.
 const MOMENT_WIDTH: usize = 480;
 const MOMENT_QUALITY: u8 = 60;
 
@@ -30,7 +30,7 @@ const MOMENT_QUALITY: u8 = 60;
 #[derive(Default)]
 pub struct Wanted {
     by_frame: BTreeMap<u64, Vec<Order>>,
-    /// Whole images of moments: the tasks by frame.
+    /// Tasks that request a whole image of a moment, by frame.
     moments: BTreeMap<u64, Vec<usize>>,
 }
 
@@ -85,13 +85,13 @@ impl Wanted {
 /// Returns the indices of the events to show, in order.
 fn chosen(events: &[EventRow]) -> BTreeSet<usize> {
     let mut all: Vec<usize> = (0..events.len()).collect();
-    // The last rank holds the ordinary events, which need no picture.
+    // The last rank contains the ordinary events, which need no picture.
     all.retain(|index| importance(&events[*index].kind) < 3);
     all.sort_by_key(|index| (importance(&events[*index].kind), *index));
     all.into_iter().take(MOST).collect()
 }
 
-/// Returns the region around the person, or else around the track.
+/// Returns the region around the person, or otherwise around the track.
 fn part(event: &EventRow, frame: &Frame) -> Option<Rect> {
     let person = frame.truths.iter().find(|truth| Some(truth.id) == event.person);
     let track = frame.reports.iter().find(|report| Some(report.id) == event.track);
@@ -99,7 +99,7 @@ fn part(event: &EventRow, frame: &Frame) -> Option<Rect> {
     Some(Rect::new(region.x, region.y, region.width, region.height).inflated(1.0))
 }
 
-/// Returns the pixels of one of `count` cells between `from` and `from + length`, one at least.
+/// Returns the pixels of one of `count` cells between `from` and `from + length`, at least one.
 fn cell(index: usize, from: f64, length: f64, count: usize) -> Range<usize> {
     let [start, end] =
         [index, index + 1].map(|edge| (from + length * edge as f64 / count as f64) as usize);

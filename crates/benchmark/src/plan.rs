@@ -31,9 +31,9 @@ const FILE: &str = "file ";
 /// One pipeline on one log with one seed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Task {
-    /// Its number in the plan, from 1.
+    /// Number in the plan, from 1.
     pub k: usize,
-    /// Content hash of everything that its result depends on.
+    /// Hash of everything on which its result depends.
     pub hash: String,
     /// Name of the pipeline.
     pub pipeline: String,
@@ -42,10 +42,10 @@ pub struct Task {
     pub config: PathBuf,
     /// Name of the log.
     pub log_name: String,
-    /// Name of the room of the log, where rooms were given.
+    /// Name of the room of the log, if rooms were given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub room: Option<String>,
-    /// True if nothing is tracked over the frames of the log.
+    /// True if the frames of the log are not tracked over time.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub single_frames: bool,
     /// Frames of the log in which people are neither missed nor found.
@@ -59,14 +59,15 @@ pub struct Task {
     pub truth: PathBuf,
     /// True if the boxes of the truth are whole bodies.
     pub whole_bodies: bool,
-    /// True if the first of doubled IDs in a frame of the truth is kept.
+    /// True if only the first of several people with the same ID in a frame of the truth is kept.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub drops_doubled_ids: bool,
     /// Seed of the run.
     pub seed: u64,
     /// Hashed inputs, by name.
     pub inputs: BTreeMap<String, String>,
-    /// SHA-256 of the recording that the log is a copy of, if `tagalong alter` made it.
+    /// SHA-256 of the recording from which `tagalong alter` made the log, if the log is such a
+    /// copy.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub copy_of: Option<String>,
     /// True if shipped models or settings of the pipeline were made with this recording.
@@ -74,29 +75,29 @@ pub struct Task {
     pub made_with_log: bool,
     /// Version of the program that planned it.
     pub version: String,
-    /// Reason for which it cannot run, if there is one.
+    /// Reason why it cannot run, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub skip: Option<String>,
 }
 
-/// Config that was read, and its inputs.
+/// Config that was read, with its inputs.
 pub struct PlannedConfig {
     /// The config.
     pub file: ConfigFile,
     /// Path of the config.
     pub path: PathBuf,
     first_seed: u64,
-    /// Its tables around the pipeline.
+    /// Its settings outside of the pipeline.
     pub outer: OuterSettings,
     /// Inputs of its pipeline.
     pub inputs: Inputs,
-    /// Its settings that may be fitted.
+    /// Its settings that may be tuned.
     pub tune: Vec<Tunable>,
-    /// Robots and cameras for which it is made.
+    /// Robots and cameras for which it is suitable.
     suits: Suits,
     /// Hashes of the recordings with which its shipped models and settings were made.
     made_with: BTreeSet<String>,
-    /// True if it has the name of the log in it.
+    /// True if it contains the name of the log.
     differs_by_log: bool,
 }
 
@@ -109,7 +110,7 @@ impl PlannedConfig {
         FrameSource::open(log, &self.outer.input, &self.outer.limits, self.inputs)
     }
 
-    /// Returns a key of its reading settings: pipelines with the same key see the same frames.
+    /// Returns a key of its input settings: pipelines with the same key see the same frames.
     pub fn reading(&self) -> String {
         format!("{:?}", (&self.outer.input, &self.outer.limits, self.inputs))
     }
@@ -119,11 +120,11 @@ impl PlannedConfig {
 pub struct Annotated {
     /// Path of the log.
     pub log: PathBuf,
-    /// Its name in tables.
+    /// Name in tables.
     pub name: String,
     /// Hash of the log.
     pub sha256: String,
-    /// Hash of the recording that it is a copy of, if `tagalong alter` made it.
+    /// Hash of the recording from which `tagalong alter` made the log, if the log is such a copy.
     pub copy_of: Option<String>,
     /// Path of its truth.
     pub truth: PathBuf,
@@ -131,18 +132,18 @@ pub struct Annotated {
     pub truth_sha256: String,
     /// True if the boxes of the truth are whole bodies.
     pub whole_bodies: bool,
-    /// True if the first of doubled IDs in a frame of the truth is kept.
+    /// True if only the first of several people with the same ID in a frame of the truth is kept.
     pub drops_doubled_ids: bool,
     /// Frames in which people are neither missed nor found.
     pub unjudged: Vec<u32>,
-    /// Name of its room, where rooms were given.
+    /// Name of its room, if rooms were given.
     pub room: Option<String>,
-    /// True if nothing is tracked over its frames.
+    /// True if its frames are not tracked over time.
     pub single_frames: bool,
 }
 
 impl Annotated {
-    /// Returns the choices by which its truth is read, as text for a hash.
+    /// Returns the options with which its truth is read, as text for a hash.
     pub fn reading(&self) -> String {
         let doubled = if self.drops_doubled_ids { "\nfirst of doubled ids" } else { "" };
         let unjudged = if self.unjudged.is_empty() {
@@ -153,7 +154,7 @@ impl Annotated {
         format!("\n{}{doubled}{unjudged}", self.whole_bodies)
     }
 
-    /// Returns a task on it that lacks what the pipeline says.
+    /// Returns a task on this log, without the values that depend on the pipeline.
     pub fn task(&self) -> Task {
         Task {
             k: 0,
@@ -183,7 +184,7 @@ impl Annotated {
 /// # Errors
 /// Configs or logs that cannot be read, or two of the same name.
 pub fn plan(args: &PlanArgs, registry: &Registry) -> Result<Vec<Task>, Failure> {
-    // A mistyped config should be told before long logs are read.
+    // An error in a config should be reported before long logs are read.
     for path in &args.configs {
         ConfigFile::read(path)?;
     }
@@ -207,7 +208,7 @@ pub fn plan(args: &PlanArgs, registry: &Registry) -> Result<Vec<Task>, Failure> 
                 config
             };
             let key = config.reading();
-            // Opening a log is slow, so the answer is shared by configs that read it the same way.
+            // Opening a log is slow, so the result is shared by configs that read it the same way.
             let opened = match tried.get(&key) {
                 Some(known) => known.clone(),
                 None => tried.entry(key).or_insert(opened(config, log)?).clone(),
@@ -247,7 +248,7 @@ pub fn plan(args: &PlanArgs, registry: &Registry) -> Result<Vec<Task>, Failure> 
     Ok(tasks)
 }
 
-/// Returns the number of tasks in words, with the option that limits them where none was given.
+/// Returns the number of tasks in words, with the option that limits it if it was not given.
 fn size(args: &PlanArgs, configs: usize, logs: usize, tasks: usize) -> String {
     let [configs, logs] = [counted(configs, "config"), counted(logs, "log")];
     let seeds = if args.seeds > 1 { format!(", {} seeds", args.seeds) } else { String::new() };
@@ -262,7 +263,7 @@ fn size(args: &PlanArgs, configs: usize, logs: usize, tasks: usize) -> String {
 pub fn reread(task: &Task, registry: &Registry) -> Result<PlannedConfig, Failure> {
     let candidate = candidate_on(&task.config, Some(&task.log), registry)?;
     let mut now = task.inputs.clone();
-    // The file list is built anew: the config may name other files now.
+    // The list of files is built again, because the config may now name other files.
     now.retain(|name, _| !name.starts_with(FILE));
     now.insert("config".into(), config_hash(&candidate, task.seed, registry)?);
     now.insert("truth".into(), sha256_of_file(&task.truth)?);
@@ -288,8 +289,8 @@ pub fn file_hashes(config: &ConfigFile) -> Result<BTreeMap<String, String>, Fail
     named.map(|(name, path)| Ok((format!("{FILE}{name}"), sha256_of_file(&path)?))).collect()
 }
 
-/// Returns the version of this very program: plugins may differ while the number does not, so a
-/// hash of its bytes belongs to it.
+/// Returns the version of this program, including a hash of its bytes, because plugins may differ
+/// while the version number does not.
 ///
 /// # Errors
 /// If the program cannot read itself.
@@ -312,7 +313,7 @@ fn task(
         ("truth".to_owned(), log.truth_sha256.clone()),
     ]);
     inputs.extend(files(config)?);
-    // The hash names the result, so it covers the program and the seed as well.
+    // The hash identifies the result, so it covers the program and the seed as well.
     let everything = format!("{version}\n{seed}{}\n{inputs:?}", log.reading());
     Ok(Task {
         hash: sha256(everything.as_bytes())[..32].to_owned(),
@@ -326,7 +327,8 @@ fn task(
     })
 }
 
-/// Returns the hash of the resolved config: comments and order do not matter, changed defaults do.
+/// Returns the hash of the resolved config: comments and order do not affect it, changed defaults
+/// do.
 fn config_hash(config: &PlannedConfig, seed: u64, registry: &Registry) -> Result<String, Failure> {
     let (pipeline, _) = config.file.pipeline(registry, Some(seed))?;
     let resolved = config.outer.resolved_with(pipeline.config())?;
@@ -336,7 +338,7 @@ fn config_hash(config: &PlannedConfig, seed: u64, registry: &Registry) -> Result
 /// Properties of a log that a config can read, or the reason why it cannot.
 type Opened = Result<Traits, String>;
 
-/// Returns the reason for which the config cannot run on the log, if there is one.
+/// Returns the reason why the config cannot run on the log, if there is one.
 ///
 /// # Errors
 /// A log that cannot be read at all.
@@ -354,8 +356,8 @@ fn opened(config: &PlannedConfig, log: &Annotated) -> Result<Opened, Failure> {
             | LogError::Calibration { .. }),
         ) => {
             let text = error.to_string();
-            // The first line names the problem, the others give advice; the folder must not reach
-            // the report.
+            // The first line names the problem, the others give advice; the folder must not appear
+            // in the report.
             let first = text.lines().next().unwrap_or_default();
             Ok(Err(first.replace(&log.log.display().to_string(), &log.name)))
         }
@@ -363,7 +365,8 @@ fn opened(config: &PlannedConfig, log: &Annotated) -> Result<Opened, Failure> {
     }
 }
 
-/// Returns the compared configs; those with the name of the log in it as they are for the first log.
+/// Returns the compared configs; those that contain the name of the log are as they are for the
+/// first log.
 fn configs(
     args: &PlanArgs,
     first: &Path,
@@ -373,7 +376,7 @@ fn configs(
         let named = args.configs.iter();
         return named.map(|path| candidate_on(path, Some(first), registry)).collect();
     }
-    // Outside of a clone those that need no file are compared.
+    // Outside of a clone, the built-in configs that need no file are compared.
     if toml_files(Path::new("configs")).is_empty() {
         return ConfigFile::built_in_names()
             .map(|name| candidate(Path::new(name), registry))
@@ -391,7 +394,7 @@ pub fn shipped(registry: &Registry) -> Result<Vec<PlannedConfig>, Failure> {
     for path in toml_files(Path::new("configs")) {
         match candidate(&path, registry) {
             Ok(candidate) => found.push(candidate),
-            // A broken config of the folder should not keep the others from running.
+            // An invalid config in the folder must not prevent the others from running.
             Err(why) => say(&format!("note: left out: {}", why.message)),
         }
     }
@@ -409,7 +412,7 @@ pub fn candidate(path: &Path, registry: &Registry) -> Result<PlannedConfig, Fail
     candidate_on(path, None, registry)
 }
 
-/// Reads a config as it is for a log.
+/// Reads a config as it applies to a log.
 fn candidate_on(
     path: &Path,
     log: Option<&Path>,
@@ -475,7 +478,7 @@ fn mcap_files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     if folder.is_file() {
         let file = folder.display();
         return Err(Failure::usage(format!(
-            "--logs-dir is a folder of logs, and {file} is a file: `--logs {file}`"
+            "--logs-dir takes a folder of logs, but {file} is a file: `--logs {file}`"
         )));
     }
     suggest::mcap_files(folder)
@@ -498,13 +501,14 @@ pub fn with_truth(log: &Path) -> Result<Annotated, Failure> {
     })
 }
 
-/// Returns the way to truth for a log that has none: people cannot be annotated in scans alone.
+/// Returns the way to obtain truth for a log that has none: people cannot be annotated in scans
+/// alone.
 fn makes_truth(log: &Path) -> String {
     let settings = InputSettings::default();
     let opened = FrameSource::open(log, &settings, &Limits::default(), Inputs::ANY);
     let is_blind = opened.is_ok_and(|source| source.facts().width == 0);
     if is_blind {
-        return "without images people cannot be annotated: give their places as \
+        return "without images people cannot be annotated: give their positions as \
                 NAME.people-floor.csv beside it"
             .into();
     }
@@ -529,14 +533,14 @@ fn annotated(log: &Path) -> Result<Option<Annotated>, Failure> {
     }))
 }
 
-/// Returns the hash of the recording that a log is a copy of.
+/// Returns the hash of the recording of which a log is a copy.
 fn copy_of(log: &Path) -> Option<String> {
-    // A log of another kind has no attachment, and errors in reading it are found elsewhere.
+    // Logs of other formats have no attachments, and read errors are found elsewhere.
     let bytes = read_attachment(log, COPY_OF, &Limits::default()).ok().flatten()?;
     String::from_utf8(bytes).ok()
 }
 
-/// Refuses a name that is used twice: names identify rows of tables.
+/// Rejects a name that is used twice, because names identify rows of tables.
 ///
 /// # Errors
 /// The repeated name.
@@ -566,7 +570,7 @@ pub fn sha256_of_file(path: &Path) -> Result<String, Failure> {
 
 fn hash_of_file(path: &Path) -> io::Result<String> {
     let mut file = File::open(path)?;
-    // Read in blocks: a log may be larger than the memory.
+    // Read in blocks, because a log may be larger than the memory.
     let mut hash = Sha256::new();
     let mut buffer = vec![0; 1 << 16];
     loop {

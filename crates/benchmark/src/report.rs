@@ -14,7 +14,7 @@ use super::store::{Store, Stored, StoredTiming};
 use super::work::blank;
 use super::{closing, foreign, made_with, moments};
 
-/// Gathers the results of a plan.
+/// Collects the results of a plan.
 ///
 /// # Errors
 /// If some are missing.
@@ -53,7 +53,8 @@ struct Matched {
     reports: u64,
 }
 
-/// Returns the notes on the truth of each log, and on logs with which pipelines were made, once each.
+/// Returns the notes on the truth of each log, and on logs with which pipelines were made, each
+/// once.
 fn notes(plan: &[Task], all: &[Stored]) -> Vec<String> {
     let mut notes: Vec<String> = Vec::new();
     let mut logs: BTreeMap<&Path, Matched> = BTreeMap::new();
@@ -78,7 +79,7 @@ fn notes(plan: &[Task], all: &[Stored]) -> Vec<String> {
     notes
 }
 
-/// Returns the names of logs that go back to one recording.
+/// Returns the groups of logs that come from one recording.
 fn copies(plan: &[Task]) -> Vec<Vec<String>> {
     let mut recordings: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
     for task in plan {
@@ -97,7 +98,7 @@ fn result(store: &Store, task: &Task) -> Option<Stored> {
     Some(Stored { result: TaskResult { outcome, ..blank(task) }, ..Stored::default() })
 }
 
-/// Returns the times, if those of all tasks were taken.
+/// Returns the times, if they were measured for all tasks.
 fn timings(store: &Store, benchmark: &Benchmark) -> Option<Timings> {
     let own = benchmark.tasks.iter().filter(|task| !task.inputs.contains_key(foreign::TRACKS));
     let done = own.filter(|task| task.outcome == Outcome::Done);
@@ -105,7 +106,7 @@ fn timings(store: &Store, benchmark: &Benchmark) -> Option<Timings> {
         done.map(|task| Some((task.hash.clone(), store.timing(&task.hash)?))).collect();
     let all = all?;
     let machine = all.first()?.1.machine.clone();
-    // Times of several machines cannot be compared, which the report has to say.
+    // Times of several machines cannot be compared; the report states this.
     let exclusive = all.iter().all(|(_, timing)| timing.machine == machine);
     let tasks = all.into_iter().map(|(hash, stored)| (hash, stored.timing)).collect();
     Some(Timings { exclusive, machine, tasks })
@@ -128,7 +129,7 @@ pub fn write(store: &Store, benchmark: &Benchmark) -> Result<String, Failure> {
     Ok(json)
 }
 
-/// Most skipped tasks that have a line with the reason in a terminal.
+/// Maximum number of skipped tasks that get a line with the reason in a terminal.
 const MOST_REASONS: usize = 6;
 
 /// Returns the main figures, for a terminal.
@@ -169,7 +170,8 @@ pub fn text(store: &Store, benchmark: &Benchmark) -> String {
     out
 }
 
-/// Returns the table of the figures in the image, and that of the logs with places alone as truth.
+/// Returns the table of the figures in the image, and that of the logs whose truth has only
+/// positions.
 fn tables(tasks: &[TaskResult]) -> String {
     let is_brief = tasks.iter().filter(|task| is_skipped(task)).count() > MOST_REASONS;
     let shown = tasks.iter().filter(|task| !is_brief || !is_skipped(task));

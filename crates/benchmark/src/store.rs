@@ -19,7 +19,7 @@ pub struct Store {
     folder: PathBuf,
 }
 
-/// One result file.
+/// Contents of a result file.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Stored {
     /// Content for the report.
@@ -29,12 +29,12 @@ pub struct Stored {
     /// Images of moments in which people are missed, by frame: JPEG in base64.
     #[serde(default)]
     pub images: BTreeMap<u64, String>,
-    /// Notes on the truth beside the log.
+    /// Notes on the truth of the log.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
 }
 
-/// Scored sequence, with the facts that the formats need beside it.
+/// Scored sequence, with the properties that the formats need in addition.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Recording {
     /// Truth and reports of all frames.
@@ -47,7 +47,7 @@ pub struct Recording {
     pub height: u32,
 }
 
-/// One file of times.
+/// Contents of a file of times.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct StoredTiming {
     /// Hash of its task.
@@ -70,7 +70,7 @@ impl Store {
         self.folder.join(name)
     }
 
-    /// Writes a file whole or not at all.
+    /// Writes a file atomically.
     ///
     /// # Errors
     /// A disk that fails.
@@ -96,8 +96,8 @@ impl Store {
         tasks.collect()
     }
 
-    /// Returns the result of a task, if it exists, is whole, and says itself that it is of this task:
-    /// a file that was copied or renamed is of another one.
+    /// Returns the result of a task, if it exists, is intact, and contains the hash of this task: a
+    /// file that was copied or renamed belongs to another one.
     pub fn result(&self, task: &Task) -> Option<Stored> {
         let stored: Stored = self.get(&result_name(&task.hash))?;
         let TaskResult { hash, inputs, seed, .. } = &stored.result;
@@ -114,7 +114,7 @@ impl Store {
         self.put(&result_name(hash), &json)
     }
 
-    /// Returns the times of a task, if they were taken and say themselves that they are of this task.
+    /// Returns the times of a task, if they were measured and contain the hash of this task.
     pub fn timing(&self, hash: &str) -> Option<StoredTiming> {
         self.get(&timing_name(hash)).filter(|timing: &StoredTiming| timing.hash == hash)
     }
@@ -128,7 +128,7 @@ impl Store {
         self.put(&timing_name(hash), &json)
     }
 
-    /// Returns a file of the benchmark as JSON, if it exists and is whole.
+    /// Returns a file of the benchmark as JSON, if it exists and is intact.
     pub fn get<T: DeserializeOwned>(&self, name: &str) -> Option<T> {
         // A damaged file counts as missing.
         serde_json::from_slice(&read_bytes(&self.path(name), FileLimit::Table).ok()?).ok()
@@ -143,8 +143,8 @@ fn timing_name(hash: &str) -> String {
     format!("timings/{hash}.json")
 }
 
-/// Writes under a name of this process and renames: several processes may write the same result,
-/// and all of them are right.
+/// Writes under a name of this process and renames, because several processes may write the same
+/// result, and all of them are right.
 ///
 /// # Errors
 /// A disk that fails.

@@ -1,4 +1,4 @@
-//! Reports of one pipeline on the frames of one log.
+//! Collection of the reports of one pipeline on the frames of one log.
 
 use std::collections::BTreeMap;
 
@@ -19,10 +19,10 @@ use tagalong_report::{Dropped, EventRow, StageTiming, TaskResult, TaskTiming, Tr
 use super::misses::add_missed;
 use super::store::Recording;
 
-/// Height of people whose whole bodies are tracked, m: that of the truth of whole bodies.
+/// Height of people whose whole bodies are tracked, m, the same as in the truth of whole bodies.
 const STANDING_M: f64 = 1.7;
 
-/// Confidence of the bounds on the normalised innovation squared.
+/// Confidence level of the bounds on the normalised innovation squared.
 const CONFIDENCE: f64 = 0.95;
 
 /// Collector of a pipeline's reports, frame by frame.
@@ -57,7 +57,7 @@ impl Watch {
 
     fn track(&mut self, item: &LogFrame, number: u32, track: &Track) {
         let camera = &item.frame.camera;
-        // Truth of whole people is cut to their upper bodies, and so are tracks.
+        // The truth of whole people is reduced to their upper bodies, and so are tracks.
         let tracked = track.estimate.region;
         let upper = if tracked.is_whole_body() {
             tracked.upper_body_of_standing(STANDING_M)
@@ -104,11 +104,11 @@ impl Watch {
         }
     }
 
-    /// Scores everything. `result` already names the task. The causes of missed people are told where
-    /// a witness of the run is given, with its rules.
+    /// Scores the reports. `result` already names the task. The causes of missed people are given
+    /// if there is a witness of the run, with its rules.
     ///
     /// # Errors
-    /// Truth that contradicts itself, in a sentence.
+    /// Truth that contradicts itself, as a sentence.
     pub fn score(
         self,
         truth: &TruthFile,
@@ -127,11 +127,10 @@ impl Watch {
     }
 }
 
-/// Scores truth and tracks side by side. `result` already names the task; causes as for
-/// [`Watch::score`].
+/// Scores truth and tracks. `result` already names the task; causes are as for [`Watch::score`].
 ///
 /// # Errors
-/// Truth that contradicts itself, in a sentence.
+/// Truth that contradicts itself, as a sentence.
 pub fn score_tracks(
     sequence: Sequence,
     truth: &TruthFile,
@@ -148,8 +147,8 @@ pub fn score_tracks(
     Ok((result, Recording { sequence, rate_hz: shots.rate_hz(), width, height }))
 }
 
-/// Fills in figures and events, by boxes and by positions as far as the truth has them; the events
-/// are those of the boxes if it has both.
+/// Fills in figures and events, by boxes and by positions, whichever the truth has; if it has both,
+/// the events are those of the boxes.
 fn score(
     sequence: &Sequence,
     truth: &TruthFile,
@@ -157,7 +156,7 @@ fn score(
     result: &mut TaskResult,
 ) -> Result<(), String> {
     let image = measure_in(sequence, truth, told, Similarity::Iou)?;
-    // Causes are those of the boxes if the truth has both, as the events.
+    // If the truth has both, causes are those of the boxes, like the events.
     let told = told.filter(|_| image.is_none());
     let metres = measure_in(sequence, truth, told, Similarity::Metres)?;
     result.image = image.as_ref().map(|measured| measured.tally.scores());
@@ -171,14 +170,14 @@ fn score(
     Ok(())
 }
 
-/// One comparison of the tracks with the truth.
+/// Result of one comparison of the tracks with the truth.
 struct Measured {
     tally: Tally,
     events: Vec<Event>,
     missed: Vec<Missed>,
 }
 
-/// Compares in the image or on the floor, where the truth has that.
+/// Compares in the image or on the floor, if the truth has the data for it.
 fn measure_in(
     sequence: &Sequence,
     truth: &TruthFile,
@@ -201,7 +200,7 @@ fn measure_in(
 /// positions; empty if it has neither.
 ///
 /// # Errors
-/// Truth that contradicts itself, in a sentence.
+/// Truth that contradicts itself, as a sentence.
 pub fn repaired(sequence: &Sequence, truth: &TruthFile) -> Result<Vec<Repaired>, String> {
     for similarity in [Similarity::Iou, Similarity::Metres] {
         if let Some(sequence) = comparable(sequence, similarity) {
@@ -212,9 +211,10 @@ pub fn repaired(sequence: &Sequence, truth: &TruthFile) -> Result<Vec<Repaired>,
     Ok(Vec::new())
 }
 
-/// Judges the values with the most frequent number of degrees of freedom.
+/// Evaluates the values with the most frequent number of degrees of freedom.
 fn consistency(nis: &[(f64, u32)]) -> Option<Consistency> {
-    // Bounds exist for one number of degrees of freedom only, so the rare others are left out.
+    // The bounds are for a single number of degrees of freedom, so the few values with others are
+    // left out.
     let mut counts: BTreeMap<u32, usize> = BTreeMap::new();
     nis.iter().for_each(|(_, freedom)| *counts.entry(*freedom).or_default() += 1);
     let (&freedom, _) = counts.iter().max_by_key(|(_, count)| **count)?;

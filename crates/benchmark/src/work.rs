@@ -1,4 +1,4 @@
-//! Runs tasks. Those that see the same frames share one pass over their log.
+//! Runs tasks. Tasks that see the same frames share one pass over their log.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::ControlFlow;
@@ -30,15 +30,15 @@ use super::watch::{Watch, repaired};
 pub struct Tally {
     /// Tasks that were requested and can run.
     pub asked: usize,
-    /// Of these, tasks that had no result before.
+    /// Tasks among these that had no result before.
     pub ran: usize,
     /// Tasks that have a result now.
     pub done: usize,
-    /// Tasks that failed, by their results.
+    /// Tasks that failed, according to their results.
     pub failed: usize,
     /// True if part of some log was lost.
     pub lost: bool,
-    /// Signal that asked to stop.
+    /// Signal that requested a stop.
     pub signal: Option<u8>,
 }
 
@@ -54,8 +54,8 @@ type Group = Vec<Ready>;
 /// Runs the tasks that have no result yet.
 ///
 /// # Errors
-/// A plan of another program, a task that is not in it, a disk that fails. A pipeline that fails is
-/// no error: its result says so.
+/// A plan of another program, a task that is not in it, a failure of the disk. A pipeline that
+/// fails is not an error: its result states it.
 pub fn work(args: &RunArgs, store: &Store, registry: &Registry) -> Result<Tally, Failure> {
     let signals = Signals::listen()?;
     let asked = asked(args, store)?;
@@ -86,7 +86,7 @@ pub fn work(args: &RunArgs, store: &Store, registry: &Registry) -> Result<Tally,
 
 fn jobs(args: &RunArgs) -> usize {
     if args.timing && args.jobs > 1 {
-        say("note: --timing runs one task at a time; --jobs is passed over");
+        say("note: --timing runs one task at a time; --jobs is ignored");
     }
     if args.timing { 1 } else { usize::from(args.jobs) }
 }
@@ -94,12 +94,12 @@ fn jobs(args: &RunArgs) -> usize {
 /// Returns the tasks that were requested and can run.
 fn asked(args: &RunArgs, store: &Store) -> Result<Vec<Task>, Failure> {
     let mut tasks = store.plan()?;
-    // Another program may give other results under the hashes of this plan.
+    // Another program may give other results for the hashes of this plan.
     let program = version()?;
     if let Some(task) = tasks.iter().find(|task| task.version != program) {
         let planned = &task.version;
         return Err(Failure::usage(format!(
-            "the plan is of program {planned}, and this is {program}; plan again"
+            "the plan was made by program {planned}, but this is {program}; plan again"
         )));
     }
     if let Some(wanted) = &args.task {
@@ -134,7 +134,7 @@ fn is_due(args: &RunArgs, store: &Store, task: &Task) -> bool {
 }
 
 /// Groups the tasks that see the same frames: of one log, read the same way. Tasks with other
-/// inputs are kept apart, or a result would depend on the company of its task.
+/// inputs are kept apart, because otherwise a result would depend on the other tasks of its group.
 fn groups(
     tasks: Vec<Task>,
     registry: &Registry,
@@ -146,7 +146,7 @@ fn groups(
         let config = reread(&task, registry)?;
         let outer = &config.outer;
         let mut key = format!("{:?}", (&task.log, &outer.input, &outer.limits, config.inputs));
-        // For times, each task has the machine to itself.
+        // When times are measured, each task has the machine to itself.
         if alone {
             key += &task.hash;
         }
@@ -155,7 +155,7 @@ fn groups(
     Ok(spread(groups.into_values().collect(), jobs))
 }
 
-/// Halves the largest groups until every job has one.
+/// Halves the largest groups until there is one for every job.
 pub fn spread<T>(mut groups: Vec<Vec<T>>, jobs: usize) -> VecDeque<Vec<T>> {
     while groups.len() < jobs {
         let Some(largest) = groups.iter_mut().max_by_key(|group| group.len()) else { break };
@@ -194,15 +194,15 @@ fn run_all(groups: VecDeque<Group>, jobs: usize, desk: &Desk<'_>) -> Result<(), 
             return ControlFlow::Break(());
         }
         let Err(failure) = desk.run(group) else { return ControlFlow::Continue(()) };
-        // The disk fails for every job: let the others end, too.
+        // The failure of the disk affects every job, so the others end as well.
         *trouble.lock().unwrap_or_else(PoisonError::into_inner) = Some(failure);
         ControlFlow::Break(())
     });
     trouble.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
 }
 
-/// Takes one item after the other out of a queue, with so many threads, until it is empty or one of
-/// them breaks off.
+/// Takes items out of a queue, with this number of threads, until it is empty or one of them breaks
+/// off.
 pub fn work_through<T: Send>(
     queue: VecDeque<T>,
     jobs: usize,
@@ -210,16 +210,16 @@ pub fn work_through<T: Send>(
 ) {
     let queue = Mutex::new(queue);
     std::thread::scope(|scope| {
-        // One job fewer: the calling thread works, too.
+        // One job fewer, because the calling thread works as well.
         for _ in 1..jobs {
-            // Without another thread, those that run do its work.
+            // If a thread cannot be started, the running ones do its work.
             let _ = std::thread::Builder::new().spawn_scoped(scope, || empty_queue(&queue, &step));
         }
         empty_queue(&queue, &step);
     });
 }
 
-/// Does the next step until the queue is empty, which a step can make it.
+/// Does the next step until the queue is empty; a step can empty it.
 fn empty_queue<T>(queue: &Mutex<VecDeque<T>>, step: &impl Fn(T) -> ControlFlow<()>) {
     loop {
         let Some(item) = queue.lock().unwrap_or_else(PoisonError::into_inner).pop_front() else {
@@ -232,11 +232,10 @@ fn empty_queue<T>(queue: &Mutex<VecDeque<T>>, step: &impl Fn(T) -> ControlFlow<(
 }
 
 impl Desk<'_> {
-    /// Runs a group and stores its results. A log that cannot be read fails its tasks and nothing
-    /// else.
+    /// Runs a group and stores its results. A log that cannot be read fails only its own tasks.
     fn run(&self, group: Group) -> Result<(), Failure> {
         self.bar.set_message(group[0].task.log_name.clone());
-        // A panic while reading or scoring fails this group; the other groups go on.
+        // A panic while reading or scoring fails this group only.
         let done = catch_unwind(AssertUnwindSafe(|| self.results(&group)));
         let all = match done {
             Ok(Ok(Some(all))) => all,
@@ -257,13 +256,13 @@ impl Desk<'_> {
         Ok(())
     }
 
-    /// Counts tasks as done, which end together.
+    /// Counts the tasks of a group as done; they end together.
     fn count(&self, done: usize) {
         self.bar.inc(done as u64);
         self.forecast.advance_by(done);
     }
 
-    /// Returns the results of a group, in its order; `None` after a stop signal.
+    /// Returns the results of a group, in order; `None` after a stop signal.
     fn results(&self, group: &Group) -> Result<Option<Vec<Kept>>, String> {
         let first = &group[0].task;
         let truth = truth_of(first).map_err(|failure| failure.message)?;
@@ -319,7 +318,8 @@ pub fn truth_of(task: &Task) -> Result<TruthFile, Failure> {
     Ok(TruthFile::read(&task.truth, options)?.without_judging(&task.unjudged))
 }
 
-/// Returns the notes on the truth of a log, without its folder: results are the same everywhere.
+/// Returns the notes on the truth of a log, without its folder, so that results are the same
+/// everywhere.
 pub fn notes_on(task: &Task, truth: &TruthFile, shots: &Shots) -> Vec<String> {
     let path = task.truth.display().to_string();
     let name = task.truth.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -343,7 +343,7 @@ fn open(ready: &Ready, inputs: Inputs) -> Result<FrameSource, String> {
     Ok(source)
 }
 
-/// One pipeline on its way through the frames.
+/// One pipeline while it processes the frames.
 pub struct Lane {
     /// The pipeline, or the error that ended it.
     pub pipeline: Result<Pipeline, String>,
@@ -352,7 +352,7 @@ pub struct Lane {
 }
 
 impl Lane {
-    /// Takes the pipeline that `build` makes.
+    /// Creates a lane for the pipeline that `build` returns.
     pub fn new(build: impl FnOnce() -> Result<Pipeline, Failure>) -> Self {
         let pipeline = match catch_unwind(AssertUnwindSafe(build)) {
             Ok(Ok(pipeline)) => Ok(pipeline),
@@ -362,7 +362,8 @@ impl Lane {
         Self { pipeline, watch: Watch::default() }
     }
 
-    /// Passes it the next frame, and returns its report. A pipeline that failed takes no more of them.
+    /// Passes the next frame to the pipeline, and returns its report. A pipeline that failed gets
+    /// no more frames.
     pub fn step(&mut self, item: &LogFrame) -> Option<FrameReport> {
         let pipeline = self.pipeline.as_mut().ok()?;
         match pipeline.step(&item.frame) {
@@ -438,7 +439,7 @@ fn without_figures(task: &Task, outcome: Outcome) -> Kept {
     (Stored { result, ..Stored::default() }, None)
 }
 
-/// Returns the lines of the config that decide the tests that dropped missed people.
+/// Returns the lines of the config that set the tests that dropped missed people.
 fn deciding(rules: Rules<'_>, result: &TaskResult) -> BTreeMap<String, Vec<String>> {
     let Rules { remedies, config } = rules;
     let mut deciding = BTreeMap::new();
@@ -450,7 +451,7 @@ fn deciding(rules: Rules<'_>, result: &TaskResult) -> BTreeMap<String, Vec<Strin
     deciding
 }
 
-/// Goes through the log once more for the pictures of the events.
+/// Reads the log once more for the pictures of the events.
 // A second pass, because the important events are known only after the scoring.
 fn illustrate(ready: &Ready, stored: &mut [Stored]) -> Result<(), String> {
     let wanted = Wanted::of(stored);

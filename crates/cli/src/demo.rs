@@ -92,8 +92,8 @@ fn note_on(furniture: &[Furniture]) -> Option<String> {
     let names = names.join(" and ");
     (!names.is_empty()).then(|| {
         format!(
-            "{names} in the room look like people and are none: the truth has no box there, and a \
-             track on one is a false one"
+            "{names} in the room look like people, but are not: the truth has no box there, and a \
+             track there is a false positive"
         )
     })
 }
@@ -122,23 +122,23 @@ fn what_now(folder: &Path) -> String {
     format!(
         "
 Look at:
-  {shown}/report/report.html: which pipeline is better, and every mistake with a picture
-  {shown}/depth-ekf/overlay/: boxes, ids, trails and a plan, one picture a frame
-  {shown}/naive/overlay/: the same, with ids that change whenever somebody is hidden
-  {shown}/depth-ekf/tracks.mcap: people in space and in the image, in Foxglove; import the layout
+  {shown}/report/report.html: which pipeline is better, and a picture of every error
+  {shown}/depth-ekf/overlay/: boxes, IDs, trails and a plan, one picture per frame
+  {shown}/naive/overlay/: the same, with IDs that change whenever a person is hidden
+  {shown}/depth-ekf/tracks.mcap: people in 3D and in the image, in Foxglove; import the layout
       bridges/ros2/foxglove/tagalong.json
 
 Try next:
   tagalong view {shown}/depth-ekf {shown}/naive
       both runs side by side in the browser, frame by frame
   tagalong trials --seeds 10
-      are the differences luck? Ten draws of each hard scene
+      whether the differences are chance: ten samples of each hard scene
   tagalong run {shown}/demo.mcap --overlay
-      by depth-verified, which `run` takes for colour and depth: slower than these two, and better
+      with depth-verified, which `run` takes for colour and depth: slower than these two, but better
   tagalong run YOUR.mcap --overlay
-      the log of your own robot, by the pipeline that is best for what it has
+      the log of your own robot, with the best pipeline for its sensors
   tagalong simulate {shown}/demo-scene.toml --gallery pictures
-      change the scene, and look at it
+      change the scene, and look at its pictures
 "
     )
 }

@@ -32,8 +32,8 @@ pub fn around_schema() -> Value {
 fn extends_schema() -> Value {
     json!({
         "type": "string",
-        "description": "Path of a config, from the folder of this one. Keys that stand here replace \
-                        those that stand there; lists are replaced as a whole.",
+        "description": "Path of a config, from the folder of this one. Keys in this config replace \
+                        those in that one; lists are replaced as a whole.",
     })
 }
 
@@ -49,7 +49,7 @@ fn tune_schema() -> Value {
                 "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2,
             },
             "steps": {
-                "description": "How many equally spaced values are tried.",
+                "description": "Number of equally spaced values that are tried.",
                 "type": "integer", "minimum": 2, "maximum": 64,
             },
         },

@@ -92,7 +92,7 @@ fn check_sums(answer: &Associations, tracks: usize, detections: usize) -> Verdic
     demand(most <= 1.0 + 1e-9, || format!("weights sum to {most}: {:?}", answer.pairs))
 }
 
-/// The sum of the weights of some of the pairs.
+/// Returns the sum of the weights of some of the pairs.
 fn weight_of(answer: &Associations, is_counted: impl Fn(&Association) -> bool) -> f64 {
     answer.pairs.iter().filter(|pair| is_counted(pair)).map(|pair| pair.weight).sum()
 }
@@ -100,7 +100,7 @@ fn weight_of(answer: &Associations, is_counted: impl Fn(&Association) -> bool) -
 fn repeatable(subject: &Subject<'_>) -> Verdict {
     let defaults = subject.info.defaults();
     let (tracks, detections) = crowd(&mut SplitMix64::new(8), 6, 8);
-    // Built without settings, and from the printed defaults, which must mean the same.
+    // Built without settings, and from the printed defaults, which must have the same meaning.
     let first = subject.associator(From::Nothing)?.associate(&tracks, &detections, &GATE);
     let second = subject.associator(From::Text(&defaults))?.associate(&tracks, &detections, &GATE);
     demand(first == second, || format!("two answers differ: {first:?} and {second:?}"))

@@ -35,8 +35,8 @@ fn bounded(twist: Twist, scene: &str) -> Verdict {
     })
 }
 
-/// Returns a target with its head at a position in the robot frame, m, 1.6 m above the floor, and
-/// with a velocity, m/s.
+/// Returns a target whose head is at a position in the robot frame, m, 1.6 m above the floor, with
+/// a velocity, m/s.
 pub fn target(x: f64, y: f64, velocity: Vector2<f64>) -> Track {
     let mut target = track(1, Point3::new(x, y, 1.6), 0.1, &level());
     target.estimate.person.velocity = velocity;
@@ -67,7 +67,7 @@ fn repeatable(subject: &Subject<'_>) -> Verdict {
     demand(first == second, || format!("two runs differ: {first:?} and {second:?}"))
 }
 
-/// The commands after a target that walks away.
+/// Returns the commands while following a target that walks away.
 fn drive_after(subject: &Subject<'_>, from: From<'_>) -> Result<Vec<Twist>, String> {
     let frame = open_space(1, &[Figure::at(2.0, 0.4)]);
     let controller = &mut *subject.controller(from)?;
@@ -75,7 +75,7 @@ fn drive_after(subject: &Subject<'_>, from: From<'_>) -> Result<Vec<Twist>, Stri
     Ok(steps.map(|t| command(controller, &frame, Some(&t))).collect())
 }
 
-/// Checks the stop also right after a target was followed at speed.
+/// Checks the stop, also immediately after a target was followed at speed.
 fn no_target_means_stop(subject: &Subject<'_>) -> Verdict {
     let controller = &mut *subject.controller(From::Nothing)?;
     let frame = open_space(1, &[]);
@@ -93,7 +93,7 @@ fn no_target_means_stop(subject: &Subject<'_>) -> Verdict {
 fn speeds_are_bounded(subject: &Subject<'_>) -> Verdict {
     let controller = &mut *subject.controller(From::Nothing)?;
     let frame = open_space(1, &[]);
-    // At the robot, beside and behind it, and farther away than any camera sees.
+    // At the robot, beside and behind it, and farther away than the range of any camera.
     let places = [0.0, 1e-9, -1e-9, 0.3, -0.3, 1.5, -1.5, 6.0, -6.0, 500.0, -500.0];
     for x in places {
         for y in places {

@@ -33,7 +33,7 @@ pub(crate) const CHECKS: &[Check] = &[
 
 const EVERYWHERE: Query<'_> = Query::Discover { occupied: &[] };
 
-/// Result of a search, or the lack of an image that the simulation does not provide.
+/// Result of a search, or the absence of an image that the simulation does not provide.
 enum SearchOutcome {
     People(Vec<Detection>),
     Lacks,
@@ -81,8 +81,8 @@ fn odd_frames_are_survived(subject: &Subject<'_>) -> Verdict {
     Ok(())
 }
 
-/// Returns true for an answer, and for the error that names an input that the frame does not hold: a
-/// detector of a sensor from outside of the simulation gets no data of it.
+/// Returns true for a result, and for the error that names an input that the frame does not have:
+/// the simulation has no data for a detector of another sensor.
 fn is_survived(outcome: &Result<Vec<Detection>, Error>, frame: &Frame) -> bool {
     match outcome {
         Ok(_) => true,
@@ -242,7 +242,8 @@ fn all_detections(subject: &Subject<'_>) -> Result<Vec<(Arc<Camera>, Detection)>
 
 fn regions_are_in_the_image(subject: &Subject<'_>) -> Verdict {
     for (camera, detection) in all_detections(subject)? {
-        // A detection without a box, like that of a laser scan, says nothing about the image.
+        // A detection without a box, such as that of a laser scan, gives no information about the
+        // image.
         let Some(region) = detection.rect() else { continue };
         let inside = region.clipped(camera.width, camera.height).area();
         // Upper-body squares are amodal and may exceed the image, but not without limit.
@@ -325,7 +326,7 @@ fn person_is_found(subject: &Subject<'_>) -> Verdict {
             let scene = format!("camera {name}, person turned by {turned_rad:.1} rad");
             let found = people(detector, &drawn(1, &camera, &[figure]), &EVERYWHERE)?;
             let believed: Vec<_> = found.into_iter().filter(|d| d.score > 0.0).collect();
-            // Other candidates are allowed as long as they are not more likely people than not.
+            // Other candidates are allowed if they are not more likely people than not.
             demand(believed.len() == 1, || format!("{scene}: {} found", believed.len()))?;
             is_at(&believed[0], &figure, &camera).map_err(|what| format!("{scene}: {what}"))?;
         }
@@ -356,7 +357,7 @@ fn person_is_followed(subject: &Subject<'_>) -> Verdict {
         let learned =
             detector.learn(&drawn(1, &camera, &[figure]), std::slice::from_ref(&followed));
         learned.map_err(|error| format!("learning is an error: {error}"))?;
-        // The predicted position is off by 10 cm, so that the detector has to search.
+        // The predicted position is wrong by 10 cm, so that the detector has to search.
         followed.estimate.person.position.y -= 0.1;
         followed.estimate.region = camera.upper_body(&followed.estimate.person.position);
         let found = people(detector, &drawn(2, &camera, &[figure]), &Query::Track(&followed))?;
@@ -366,7 +367,7 @@ fn person_is_followed(subject: &Subject<'_>) -> Verdict {
     Ok(())
 }
 
-/// Simulates a person that is tracked for three frames and leaves; then the track ends.
+/// Simulates a person that is tracked for three frames and then leaves; then the track ends.
 fn forgets(subject: &Subject<'_>) -> Verdict {
     let camera = level();
     let detector = &mut *subject.detector(From::Nothing)?;
@@ -387,8 +388,8 @@ fn forgets(subject: &Subject<'_>) -> Verdict {
     believed_empty(&found, "after the person has left")
 }
 
-/// Checks the names under which candidates are dropped, and those of the advice: `doctor` would
-/// explain a test of the detector by the settings of the tracker.
+/// Checks the names of the tests that drop candidates, and those in the advice: otherwise `doctor`
+/// would explain a test of the detector with the settings of the tracker.
 fn tests_have_own_names(subject: &Subject<'_>) -> Verdict {
     let all = subject.registry.all_remedies();
     let own = all.filter(|(plugin, _)| *plugin == subject.info.name);
@@ -399,7 +400,7 @@ fn tests_have_own_names(subject: &Subject<'_>) -> Verdict {
     for frame in walk(&camera) {
         for query in [EVERYWHERE, Query::Track(&lost)] {
             let mut funnel = Funnel::default();
-            // Other checks tell of errors.
+            // Errors are found by other checks.
             let _ = detector.detect(&frame, &query, &mut funnel);
             names.extend(funnel.entries().iter().map(|entry| entry.test));
         }

@@ -11,7 +11,7 @@ use tagalong_core::{DepthImage, Images, LaserScan, RgbImage};
 use tagalong_geometry::Camera;
 use tagalong_math::{RandomSource, SplitMix64};
 
-/// Height of the laser scanner above the floor, m: that of shins.
+/// Height of the laser scanner above the floor, m: that of the shins.
 pub const SCANNER_HEIGHT_M: f64 = 0.3;
 /// Range of the laser scanner, m.
 pub const SCANNER_RANGE_M: f64 = 10.0;
@@ -42,7 +42,7 @@ pub struct World {
 }
 
 impl Figure {
-    /// Returns a person of ordinary height at a position on the floor that faces the robot.
+    /// Returns a person of average height that faces the robot, at a position on the floor.
     pub fn at(x: f64, y: f64) -> Self {
         Self { head: Point3::new(x, y, 1.6), heading_rad: (-y).atan2(-x) }
     }
@@ -76,12 +76,13 @@ impl World {
         Images { colour: Some(Arc::new(colour)), depth: Some(Arc::new(depth)), ..Images::default() }
     }
 
-    /// Measures the scan of a laser at the origin of the robot, [`SCANNER_HEIGHT_M`] above the floor,
-    /// half of the circle ahead. Rays that meet nothing within [`SCANNER_RANGE_M`] are left out.
+    /// Measures the scan of a laser at the origin of the robot, [`SCANNER_HEIGHT_M`] above the
+    /// floor, over the front half circle. Rays that hit nothing within [`SCANNER_RANGE_M`] are left
+    /// out.
     pub fn scan(&self) -> LaserScan {
         let shapes: Vec<Ellipsoid> = self.people.iter().flat_map(body).collect();
         let eye = Vector3::new(0.0, 0.0, SCANNER_HEIGHT_M);
-        // Another stream of numbers than that of the depth image.
+        // Another stream of random numbers than that of the depth image.
         let mut random = self.noise_seed.map(|seed| SplitMix64::new(!seed));
         let mut rays = Vec::new();
         let mut points = Vec::new();
@@ -130,7 +131,7 @@ struct Hit {
 /// advances by `along` per metre of depth.
 fn plane(away: f64, along: f64, light: f64, colour: [u8; 3]) -> Option<Hit> {
     let depth_m = away / along;
-    // A plane behind the camera, or beyond 50 m, is not seen.
+    // A plane behind the camera, or beyond 50 m, is not visible.
     let seen = depth_m.is_finite() && depth_m > 0.01 && depth_m < 50.0;
     seen.then(|| Hit { depth_m, colour: shade(colour, light) })
 }
@@ -150,7 +151,7 @@ struct Ellipsoid {
 }
 
 impl Ellipsoid {
-    /// Returns the nearer intersection of `eye + t * ray`; `t` is the depth because the ray is
+    /// Returns the nearer intersection of `eye + t * ray`; `t` is the depth, because the ray is
     /// scaled to depth 1.
     fn hit(&self, eye: Vector3<f64>, ray: Vector3<f64>) -> Option<Hit> {
         let start = (self.turn * (eye - self.centre)).component_div(&self.half);
@@ -170,14 +171,14 @@ impl Ellipsoid {
     }
 }
 
-/// Offset from the head (along the heading, to the left, below); the three half axes; colour.
+/// Offset from the head (along the heading, left, down); the three half axes; colour.
 type Part = ([f64; 3], [f64; 3], [u8; 3]);
 
 const SKIN: [u8; 3] = [224, 172, 140];
 const SHIRT: [u8; 3] = [60, 90, 170];
 
-/// All parts above the hip, m. A head is about 19 cm long and 16 cm broad with hair, and lies some
-/// 4 cm in front of the axis of the trunk.
+/// All parts above the hip, m. A head is about 19 cm long and 16 cm wide with hair, and lies some 4
+/// cm in front of the axis of the trunk.
 const UPPER_PARTS: [Part; 6] = [
     ([0.0, 0.0, 0.0], [0.095, 0.08, 0.115], SKIN),
     ([-0.02, 0.0, 0.15], [0.06, 0.065, 0.13], SKIN),
@@ -191,7 +192,7 @@ const UPPER_PARTS: [Part; 6] = [
 const HIP_M: f64 = 0.80;
 
 fn body(figure: &Figure) -> impl Iterator<Item = Ellipsoid> {
-    // The legs keep a positive length for a head at or below the height of the hip.
+    // The legs keep a positive length even if the head is at or below the height of the hip.
     let half_leg = (0.5 * (figure.head.z - HIP_M)).max(0.1);
     let legs = [0.09, -0.09].map(|across| -> Part {
         ([-0.04, across, HIP_M + half_leg], [0.09, 0.08, half_leg + 0.03], [50, 50, 60])

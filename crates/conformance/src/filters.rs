@@ -1,7 +1,7 @@
 //! Checks of filters.
 //!
-//! A filter receives detections of people at known positions, while the robot stands or drives.
-//! Filters that weigh scenes get a likelihood that knows the true positions.
+//! A filter receives detections of people at known positions, while the robot is at rest or drives.
+//! Filters that weight scenes get a likelihood that knows the true positions.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -45,7 +45,7 @@ impl Likelihood for Oracle {
                 .map(|person| {
                     let nearest =
                         self.0.iter().map(|truth| (person.position - truth).norm_squared());
-                    // Beyond 1 m the likelihood is flat, as that of an image is.
+                    // Beyond 1 m the likelihood is constant, like that of an image.
                     let d2 = nearest.fold(1.0, f64::min);
                     (1.0 - d2) / (2.0 * 0.1 * 0.1)
                 })
@@ -88,7 +88,7 @@ impl Run {
         sighting(&head, &self.camera, SIGMA_M, &mut self.random)
     }
 
-    /// Starts one track per position, with the ids 1, 2, ...
+    /// Starts one track per position, with the IDs 1, 2, ...
     fn start(&mut self, places: &[Point3<f64>]) {
         for (id, place) in (1..).zip(places) {
             let detection = self.sight(place);
@@ -139,7 +139,8 @@ impl Run {
     }
 }
 
-/// Returns a motion of half a metre a second, turning by 0.2 rad/s, with realistic odometry noise.
+/// Returns a motion of half a metre per second, turning at 0.2 rad/s, with realistic odometry
+/// noise.
 fn driving() -> EgoMotion {
     let turn = 0.2 * DT_S;
     let covariance = Matrix3::from_diagonal(&nalgebra::Vector3::new(1e-6, 1e-6, 1e-7));
@@ -172,7 +173,7 @@ fn repeatable(subject: &Subject<'_>) -> Verdict {
     demand(first == second, || format!("two runs differ: {first:?} and {second:?}"))
 }
 
-/// The estimates after two people were watched from a driving robot.
+/// Returns the estimates after two people were observed from a driving robot.
 fn couple_watched(
     subject: &Subject<'_>,
     from: From<'_>,
@@ -195,7 +196,8 @@ fn covariance_stays_positive(subject: &Subject<'_>) -> Verdict {
         for (id, estimate) in run.estimates() {
             let p = estimate.covariance;
             let skew = (p - p.transpose()).abs().max();
-            // A covariance may be singular, and rounding would then fail the decomposition.
+            // A covariance may be singular, and the decomposition could then fail because of
+            // rounding.
             let ridge = nalgebra::SMatrix::identity() * (1e-9 * p.norm().max(1e-6));
             let positive = skew <= 1e-9 * p.norm() && (p + ridge).cholesky().is_some();
             demand(positive && estimate.is_sane(), || {
@@ -256,7 +258,7 @@ fn standing_person_stands(subject: &Subject<'_>) -> Verdict {
     Ok(())
 }
 
-/// Checks that a second without evidence does not carry the standing person away.
+/// Checks that a second without evidence does not carry a standing person away.
 fn coasts(run: &mut Run, place: &Point3<f64>) -> Verdict {
     for _ in 0..10 {
         run.step(&[])?;
@@ -297,7 +299,7 @@ fn stop_forgets(subject: &Subject<'_>) -> Verdict {
     demand(left == [TrackId(2)], || format!("of tracks 1 and 2, stopping 1 leaves {left:?}"))
 }
 
-/// Changes the order of the evidence, and misses each of the two people at times.
+/// Changes the order of the evidence, and misses each of the two people from time to time.
 fn ids_never_mix(subject: &Subject<'_>) -> Verdict {
     let mut run = Run::new(subject, From::Nothing, driving())?;
     run.start(&COUPLE);
@@ -307,7 +309,7 @@ fn ids_never_mix(subject: &Subject<'_>) -> Verdict {
     for seen in orders.iter().cycle().take(24) {
         let supported = run.step(seen)?;
         let missing = seen.iter().find(|(id, _)| !supported.contains_key(&TrackId(*id)));
-        // A filter that weighs scenes finds its evidence in the image, not in the detections.
+        // A filter that weights scenes finds its evidence in the image, not in the detections.
         demand(missing.is_none() || run.filter.requirements().likelihood, || {
             format!("its own sighting does not support track {:?}", missing.map(|(id, _)| id))
         })?;

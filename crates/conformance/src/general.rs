@@ -18,8 +18,8 @@ fn builds(subject: &Subject<'_>) -> Verdict {
     subject.try_build(From::Nothing)
 }
 
-/// Checks that the printed defaults are TOML, hold each required setting, and build. The check
-/// "same seed, same output" shows that they also *mean* the defaults.
+/// Checks that the printed defaults are TOML, contain each required setting, and can be built. The
+/// check "same seed, same output" shows that they also *mean* the defaults.
 fn defaults_survive(subject: &Subject<'_>) -> Verdict {
     let text = subject.info.defaults();
     let table: toml::Table =

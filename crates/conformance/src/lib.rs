@@ -1,6 +1,6 @@
 //! Conformance suite for all plugins of a [`Registry`].
 //!
-//! A plugin is tested as soon as it is listed: the suite builds it from its default settings, runs
+//! A plugin is tested as soon as it is listed: the suite builds it with its default settings, runs
 //! it on small simulated scenes (see [`figure`]) and checks the contracts of the traits of
 //! `tagalong_core`. A crate outside the workspace runs the same suite over its own registry:
 //!
@@ -10,9 +10,9 @@
 //! ```
 //!
 //! A panic inside a plugin is caught and becomes a [`Failure`] that names the plugin and the check.
-//! The type of a detector does not tell if it has to find the simulated people (a face detector
-//! sees no face in them, and some detectors only find tracked people again), so that is demanded by
-//! name: [`Suite::must_discover`], [`Suite::must_follow`].
+//! The type of a detector does not show whether it has to find the simulated people (a face
+//! detector sees no face in them, and some detectors only find tracked people again), so this has
+//! to be demanded by name: [`Suite::must_discover`], [`Suite::must_follow`].
 
 mod associators;
 mod controllers;
@@ -61,15 +61,15 @@ impl fmt::Display for Failure {
     }
 }
 
-/// Returns the context of plugins in tests: seed 1, paths from the working directory, the drive of
-/// a small robot.
+/// Returns the context of plugins in tests: seed 1, paths relative to the working directory, the
+/// drive of a small robot.
 pub fn context() -> Context {
     Context::new(1, ".", WHEELS)
 }
 
 type Checks = Chain<slice::Iter<'static, Check>, slice::Iter<'static, Check>>;
 
-/// The suite over one registry.
+/// The suite for one registry.
 pub struct Suite<'a> {
     registry: &'a Registry,
     base_dir: PathBuf,
@@ -78,7 +78,7 @@ pub struct Suite<'a> {
 }
 
 impl<'a> Suite<'a> {
-    /// Creates a suite without demands on single detectors.
+    /// Creates a suite without demands on individual detectors.
     pub fn new(registry: &'a Registry) -> Self {
         Self {
             registry,
@@ -106,12 +106,12 @@ impl<'a> Suite<'a> {
         self
     }
 
-    /// Returns all failures of all plugins; a demand on a detector that is not registered is one,
-    /// too, and so is a registry without plugins.
+    /// Returns all failures of all plugins. A demand on a detector that is not registered is a
+    /// failure as well, and so is a registry without plugins.
     #[must_use = "broken promises are returned, not asserted"]
     pub fn check_all(&self) -> Vec<Failure> {
         let mut failures = self.unmet_demands();
-        // A `register` that does nothing would keep every promise.
+        // Without this check, a `register` that does nothing would pass.
         if self.registry.plugins().next().is_none() {
             let what = "the registry has no plugin to check".to_owned();
             failures.push(failure("(none)", "is registered", what));
@@ -171,7 +171,7 @@ impl<'a> Suite<'a> {
     }
 }
 
-/// Runs [`Suite::check_all`] without demands on single detectors.
+/// Runs [`Suite::check_all`] without demands on individual detectors.
 #[must_use = "broken promises are returned, not asserted"]
 pub fn check_all(registry: &Registry) -> Vec<Failure> {
     Suite::new(registry).check_all()
@@ -180,7 +180,7 @@ pub fn check_all(registry: &Registry) -> Vec<Failure> {
 /// Asserts that all plugins of a `register` function pass [`check_all`].
 ///
 /// # Panics
-/// With all failures, if there are any.
+/// If there are failures, with all of them.
 #[track_caller]
 pub fn assert_conforms(register: impl FnOnce(&mut Registry)) {
     let mut registry = Registry::default();
@@ -212,7 +212,7 @@ fn run(
     name: &'static str,
     check: fn(&Subject<'_>) -> Verdict,
 ) -> Option<Failure> {
-    // Each check builds its own plugins, so a panic leaves no broken state to later checks.
+    // Each check builds its own plugins, so a panic leaves no broken state for later checks.
     let outcome = catch_unwind(AssertUnwindSafe(|| check(subject)));
     let what = match outcome {
         Ok(Ok(())) => return None,

@@ -22,7 +22,7 @@ pub(crate) const CHECKS: &[Check] = &[
     ("ends are of tracks that live", ends_are_of_the_living),
 ];
 
-/// A manager, with the bookkeeping that the tracker does for it.
+/// A manager, with the bookkeeping that the tracker normally does for it.
 struct Run {
     manager: Box<dyn TrackManager>,
     tracks: BTreeMap<TrackId, Track>,
@@ -45,7 +45,7 @@ impl Run {
         Ok(Self { manager, tracks: BTreeMap::new(), started: 0, ended: Vec::new() })
     }
 
-    /// Offers a candidate; returns its track, if it starts one.
+    /// Offers a candidate; returns its track if it starts one.
     fn offer(&mut self, detection: &Detection) -> Option<TrackId> {
         let id = TrackId(self.started + 1);
         let log_odds = detection.score;
@@ -118,7 +118,7 @@ fn repeatable(subject: &Subject<'_>) -> Verdict {
     demand(first == second, || format!("two runs differ: {first:?} and {second:?}"))
 }
 
-/// Tracks of two people, of which one is missed now and then.
+/// Tracks of two people; one person is missed from time to time.
 #[derive(Debug, PartialEq)]
 struct Watched {
     health: Vec<(bool, f64)>,

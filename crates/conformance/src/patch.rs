@@ -1,5 +1,5 @@
-//! Minimal input of a verifier: one candidate in one grey image that shows a head above shoulders,
-//! or bars.
+//! Minimal input of a verifier: one candidate in one grey image that shows head and shoulders, or
+//! bars.
 
 use std::sync::Arc;
 
@@ -7,8 +7,8 @@ use nalgebra::{Matrix3, Point3};
 use tagalong_core::{Detection, EgoMotion, Frame, GreyImage, Images, Stamp};
 use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
 
-/// Renders a dark head above dark shoulders before a bright wall, or bars: 64x64, with noise from a
-/// seed.
+/// Renders a dark head above dark shoulders in front of a bright wall, or bars: 64x64 pixels, with
+/// noise from a seed.
 pub fn picture(is_person: bool, seed: u32) -> GreyImage {
     let mut state = seed.wrapping_mul(2_654_435_761) | 1;
     GreyImage::from_fn(64, 64, |x, y| {
@@ -26,7 +26,7 @@ pub fn picture(is_person: bool, seed: u32) -> GreyImage {
     })
 }
 
-/// Returns a frame of that picture, from a camera 1 m above the floor that looks ahead.
+/// Returns a frame with that picture, from a camera 1 m above the floor that looks forward.
 pub fn frame(grey: GreyImage) -> Frame {
     let lens = Pinhole { fx: 60.0, fy: 60.0, cx: 32.0, cy: 32.0, distortion: Distortion::None };
     let camera = Arc::new(Camera::mounted(lens, grey.width(), grey.height(), 1.0, 0.0, 0.0));
@@ -34,7 +34,7 @@ pub fn frame(grey: GreyImage) -> Frame {
     Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.1), images)
 }
 
-/// Returns the candidate of that picture: 2 m ahead, of score 1.
+/// Returns the candidate in that picture: 2 m ahead, with score 1.
 pub fn candidate() -> Detection {
     Detection::new("test", Point3::new(2.0, 0.0, 1.6), Matrix3::identity(), 1.0)
         .with_image(ImageBox::upper_body(Rect::new(8.0, 8.0, 48.0, 48.0)))

@@ -1,5 +1,5 @@
-//! Tracks, detections and pairs for the tests of plugins, of which a test states only the field
-//! that it is about:
+//! Tracks, detections and pairs for the tests of plugins; a test only states the field that it is
+//! about:
 //!
 //! ```
 //! # use tagalong_core::Detection;
@@ -15,7 +15,7 @@ use tagalong_geometry::{ImageBox, Rect};
 
 use crate::scenes::{DT_S, level, track};
 
-/// Gate of two frames that are 0.1 s apart, without an appearance memory.
+/// Gate between two frames that are 0.1 s apart, without an appearance memory.
 pub const GATE: Gate<'static> = Gate::new(DT_S, 0.0);
 
 /// Height of the heads, m.
@@ -23,8 +23,8 @@ const HEAD_M: f64 = 1.6;
 /// Standard deviation of the positions, m.
 const SIGMA_M: f64 = 0.1;
 
-/// Returns a detection of a person at a place on the floor in the robot frame, m, with a standard
-/// deviation of 0.1 m.
+/// Returns a detection of a person at a position on the floor in the robot frame, m, with a
+/// standard deviation of 0.1 m.
 pub fn detection_at(x: f64, y: f64) -> Detection {
     let position = Point3::new(x, y, HEAD_M);
     Detection::new("sample", position, Matrix3::identity() * (SIGMA_M * SIGMA_M), 2.0)
@@ -36,8 +36,8 @@ pub fn detection_in(region: Rect) -> Detection {
     detection_at(3.0, 0.0).with_image(ImageBox::full_body(region))
 }
 
-/// Returns a confirmed track at rest at a place on the floor in the robot frame, m, with a standard
-/// deviation of 0.1 m.
+/// Returns a confirmed track at rest at a position on the floor in the robot frame, m, with a
+/// standard deviation of 0.1 m.
 pub fn track_at(id: u32, x: f64, y: f64) -> Track {
     track(id, Point3::new(x, y, HEAD_M), SIGMA_M, &level())
 }

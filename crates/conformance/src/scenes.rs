@@ -27,12 +27,12 @@ fn camera(width: usize, height_m: f64, pitch_down_deg: f64, roll_deg: f64) -> Ca
     Camera::mounted(lens, width, height, height_m, pitch, roll)
 }
 
-/// Returns a level camera at breast height.
+/// Returns a level camera at chest height.
 pub(crate) fn level() -> Arc<Camera> {
     Arc::new(camera(640, 1.2, 0.0, 0.0))
 }
 
-/// Returns the mountings under which a detector must work: level; looking down from above with a
+/// Returns the mountings with which a detector must work: level; looking down from above with a
 /// roll; level at half the resolution.
 pub(crate) fn mountings() -> [(&'static str, Arc<Camera>); 3] {
     [
@@ -75,7 +75,7 @@ pub(crate) fn odd_frames() -> Vec<(&'static str, Frame)> {
             depth: Some(Arc::new(DepthImage::filled(w, h, depth))),
             right: Some(Arc::new(RightImage { image: Image::filled(w, h, grey), baseline_m: 0.1 })),
         };
-        // Five reflections at the scanner itself: a scan without useful content, too.
+        // Five reflections at the scanner itself: another scan without useful content.
         let scan = LaserScan::of_points(vec![Point3::origin(); 5]);
         frame(1, camera, images).with_laser(Some(scan))
     }
@@ -102,12 +102,12 @@ pub(crate) fn bare_frame() -> Frame {
     frame(1, &level(), Images::default())
 }
 
-/// Returns the frame with these inputs alone.
+/// Returns the frame with only these inputs.
 pub(crate) fn restricted(frame: Frame, inputs: &Inputs) -> Frame {
     frame.restricted_to(inputs).unwrap_or(frame)
 }
 
-/// Returns the required ones of these inputs.
+/// Returns those of these inputs that are required.
 pub(crate) fn required(inputs: &Inputs) -> Inputs {
     inputs.of(Usage::Optional).fold(*inputs, Inputs::without)
 }
@@ -131,7 +131,7 @@ pub(crate) fn sighting(
 ) -> Detection {
     let error = nalgebra::Vector3::from_fn(|_, _| sigma_m * random.normal());
     let position = head + error;
-    // Not less than 1 cm of standard deviation: filters invert the covariance.
+    // At least 1 cm of standard deviation, because filters invert the covariance.
     let covariance = nalgebra::Matrix3::identity() * (sigma_m * sigma_m).max(1e-4);
     Detection::new("conformance", position, covariance, 3.0)
         .with_image(ImageBox::upper_body(camera.upper_body(&position)))

@@ -4,10 +4,10 @@ use tagalong_config::{ConfigError, Context, PluginInfo, Registry, Value};
 use tagalong_core::{Associator, Controller, Detector, DiffDrive, Filter, TrackManager, Verifier};
 use toml::de::{DeTable, DeValue};
 
-/// The drive in checks of controllers.
+/// The drive that is used in checks of controllers.
 pub(crate) const WHEELS: DiffDrive = DiffDrive { half_separation_m: 0.167, slip: 0.02 };
 
-/// The plugin under test, with all that is needed to build it.
+/// The plugin under test, with everything that is needed to build it.
 pub(crate) struct Subject<'a> {
     pub(crate) registry: &'a Registry,
     pub(crate) info: &'a PluginInfo,
@@ -16,12 +16,12 @@ pub(crate) struct Subject<'a> {
     pub(crate) must_follow: bool,
 }
 
-/// Source of the settings of a build.
+/// Source of the settings for building the plugin.
 #[derive(Clone, Copy)]
 pub(crate) enum From<'t> {
     /// No `config` table at all.
     Nothing,
-    /// A `config` table of this text.
+    /// A `config` table with this text.
     Text(&'t str),
 }
 

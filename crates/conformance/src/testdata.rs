@@ -1,6 +1,6 @@
 //! Access of tests to recorded data.
 //!
-//! Recordings of people are not part of this repository: they lie beside it, in `../shared/data`. A
+//! Recordings of people are not part of this repository: they are beside it, in `../shared/data`. A
 //! test that needs some calls [`find`], and returns early if they are absent. A message on the
 //! terminal, which bypasses the capture of `cargo test`, distinguishes a skipped test from a passed
 //! one; if [`REQUIRE`] is set to `1`, the test fails instead.
@@ -34,7 +34,7 @@ pub fn find(name: &str) -> Option<PathBuf> {
     }
 }
 
-/// Returns the path, or the message about its absence.
+/// Returns the path, or a message that it is absent.
 #[expect(clippy::panic, reason = "a skip that is not allowed fails the test")]
 fn look_for(path: &Path, test: &str, is_required: bool) -> Result<PathBuf, String> {
     if path.exists() {

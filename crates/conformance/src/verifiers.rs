@@ -29,7 +29,7 @@ fn margin(
     Ok(margin)
 }
 
-/// Returns candidates on, beside and outside the person, of odd sizes, and without a box.
+/// Returns candidates on, beside and away from the person, of odd sizes, and without a box.
 fn candidates() -> Vec<Detection> {
     let figure = Figure::at(2.0, 0.1);
     let good = sighting(&figure.head, &level(), 0.02, &mut SplitMix64::new(1));

@@ -38,7 +38,7 @@ pub fn text(diagnosis: &Diagnosis) -> String {
     }
     if !diagnosis.funnel.is_empty() {
         let _ =
-            writeln!(out, "\nwhat the pipeline dropped, and the settings that decide it (now):");
+            writeln!(out, "\ncandidates dropped by each test, and its settings with their values:");
     }
     diagnosis.funnel.iter().take(FUNNEL_LINES).for_each(|line| drop(&mut out, line));
     summary(&mut out, &diagnosis.findings);
@@ -85,8 +85,8 @@ fn slow(out: &mut String, diagnosis: &Diagnosis) {
     if !names.is_empty() {
         let _ = writeln!(
             out,
-            "  ms: wall time a frame on this computer; the log has a frame every {period_ms:.0} ms: live, {} \
-             would skip some",
+            "  ms: wall time per frame on this computer; the log has a frame every {period_ms:.0} \
+             ms: live, {} would skip some",
             names.join(", ")
         );
     }
@@ -108,8 +108,8 @@ fn better(out: &mut String, taken: &Row, rows: &[Row]) {
         let name = &best.config;
         let _ = writeln!(
             out,
-            "{name} misses fewer shapes here ({} against {}); identities are not measured: compare with \
-             `annotate` and `bench`",
+            "{name} misses fewer shapes here ({} against {}); ID switches are not measured: \
+             compare with `annotate` and `bench`",
             percent(1.0 - best_found),
             percent(1.0 - taken_found)
         );
@@ -121,7 +121,7 @@ fn settings(out: &mut String, diagnosis: &Diagnosis) {
     if diagnosis.alternatives.is_empty() {
         return;
     }
-    let _ = writeln!(out, "\nwhat other settings change on this log, the best first:");
+    let _ = writeln!(out, "\nother settings on this log, the best first:");
     let _ = writeln!(out, "  {}  setting", heading());
     let _ = writeln!(out, "  {}  (as it is)", figures(&diagnosis.coverage));
     for Alternative { change, coverage } in diagnosis.alternatives.iter().take(SETTING_LINES) {
@@ -159,11 +159,11 @@ fn percent(part: f64) -> String {
 /// Returns the meaning of the columns, by what the log has.
 fn legend(coverage: &Coverage) -> &'static str {
     if coverage.has_depth {
-        "  moving, still: tracks that moved, and that never did; boxes: in a frame; idle: boxes where\n  \
+        "  moving, still: tracks that moved, and that never did; boxes: per frame; idle: boxes where\n  \
          nothing comes or goes; missed: person-sized shapes that come and go without a track"
     } else {
-        "  moving, still: tracks that moved, and that never did; boxes: in a frame; idle: boxes of\n  \
-         those that never did; missed: not measured without depth"
+        "  moving, still: tracks that moved, and that never did; boxes: per frame; idle: boxes of\n  \
+         tracks that never moved; missed: not measured without depth"
     }
 }
 
@@ -191,8 +191,8 @@ fn summary(out: &mut String, findings: &[Finding]) {
     let [bad, warn] = [Severity::Bad, Severity::Warn]
         .map(|severity| findings.iter().filter(|finding| finding.severity == severity).count());
     let _ = match (bad, warn) {
-        (0, 0) => writeln!(out, "\nnothing to complain about"),
-        _ => writeln!(out, "\n{bad} bad, {warn} to look at; begin with the first"),
+        (0, 0) => writeln!(out, "\nno problem found"),
+        _ => writeln!(out, "\n{bad} bad, {warn} to look at; begin with the first one"),
     };
 }
 
@@ -232,8 +232,8 @@ mod tests {
         let told = said(row("first", 3, 16), row("second", 4, 5));
         assert_eq!(
             told,
-            "second misses fewer shapes here (5 % against 16 %); identities are not measured: compare \
-             with `annotate` and `bench`\n"
+            "second misses fewer shapes here (5 % against 16 %); ID switches are not measured: \
+             compare with `annotate` and `bench`\n"
         );
         assert_eq!(said(row("first", 3, 16), row("second", 4, 15)), "", "too small a gain");
         assert_eq!(said(row("first", 3, 16), row("second", 0, 5)), "", "no track of it moves");

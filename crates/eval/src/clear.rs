@@ -4,27 +4,26 @@ use crate::prepare::{Prepared, PreparedFrame};
 use crate::ratio;
 use tagalong_math::matching::{Edge, Matcher};
 
-/// The similarity from which on a match counts in CLEAR MOT and Identity.
+/// Minimum similarity of a match in CLEAR MOT and Identity.
 pub const MATCH_SIMILARITY: f64 = 0.5;
 
-/// Worth of going on with the track of the previous frame; more than any similarity.
+/// Weight of continuing with the track of the previous frame; larger than any similarity.
 const CONTINUATION: f64 = 1000.0;
 
-/// A truth and the report that goes with it in one frame.
+/// A truth and the report that is matched with it in one frame.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Match {
-    /// Position in [`PreparedFrame::truths`].
+    /// Index in [`PreparedFrame::truths`].
     pub row: u32,
-    /// Position in [`PreparedFrame::tracks`].
+    /// Index in [`PreparedFrame::tracks`].
     pub col: u32,
     /// Similarity of the two.
     pub similarity: f64,
 }
 
-/// The CLEAR MOT counts (Bernardin and Stiefelhagen, EURASIP JIVP 2008) with
-/// the conventions of TrackEval: a match of the previous frame is kept before
-/// similarity is looked at, and an id switch is counted against the last track
-/// that a truth ever had.
+/// The CLEAR MOT counts (Bernardin and Stiefelhagen, EURASIP JIVP 2008) with the conventions of
+/// TrackEval: a match of the previous frame is kept before similarities are compared, and an ID
+/// switch is counted against the last track that a truth ever had.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Clear {
     /// Matched truths.
@@ -34,19 +33,20 @@ pub struct Clear {
     pub fn_: u64,
     /// Reports without a truth.
     pub fp: u64,
-    /// Changes of the track that goes with a truth.
+    /// Changes of the track that is matched with a truth.
     pub id_switches: u64,
-    /// Matches of a truth with a track whose last match was another truth: the truth has inherited an
-    /// ID. Two truths that swap their tracks are two switches and two of these; a new person with the
-    /// ID of a person that left is one of these and no switch. TrackEval has no such figure.
+    /// Matches of a truth with a track whose last match was another truth: the truth has inherited
+    /// an ID. Two truths that swap their tracks count as two switches and two inherited IDs; a new
+    /// person with the ID of a person that left counts as one inherited ID and no switch. TrackEval
+    /// has no such figure.
     #[serde(default)]
     pub inherited_ids: u64,
-    /// Interruptions: the number of times that a truth was found again after a pause. As in
-    /// TrackEval a person that left the view and came back counts, too.
+    /// Interruptions: the number of times that a truth was matched again after a pause. As in
+    /// TrackEval, a person that left the view and came back counts as well.
     pub fragmentations: u64,
     /// Truths matched in more than 80 % of their frames.
     pub mostly_tracked: u64,
-    /// Truths in between.
+    /// Truths that are neither mostly tracked nor mostly lost.
     pub partly_tracked: u64,
     /// Truths matched in less than 20 % of their frames.
     pub mostly_lost: u64,
@@ -65,7 +65,7 @@ impl Clear {
         (run.finish(prepared), matches)
     }
 
-    /// The counts of several sequences together.
+    /// Combines the counts of several sequences.
     pub fn combine<'a>(all: impl IntoIterator<Item = &'a Self>) -> Self {
         all.into_iter().fold(Self::default(), |a, b| Self {
             tp: a.tp + b.tp,
@@ -82,29 +82,29 @@ impl Clear {
         })
     }
 
-    /// Accuracy: `(TP - FP - IDSW) / truths`; 1 at best, without lower bound.
-    /// Where there is no truth the denominator is 1, as in TrackEval's
-    /// combined figure (its figure for such a sequence alone is 0).
+    /// Returns the accuracy `(TP - FP - IDSW) / truths`: at most 1, without lower bound. Without
+    /// truths the denominator is 1, as in TrackEval's combined figure (its figure for such a
+    /// sequence alone is 0).
     pub fn mota(&self) -> f64 {
         ratio(self.tp as f64 - self.fp as f64 - self.id_switches as f64, self.truths())
     }
 
-    /// Precision: mean similarity of the matches, 0 to 1.
+    /// Returns the precision: the mean similarity of the matches, 0 to 1.
     pub fn motp(&self) -> f64 {
         ratio(self.similarity_sum, self.tp as f64)
     }
 
-    /// Fraction of the truths that were matched.
+    /// Returns the fraction of the truths that were matched.
     pub fn recall(&self) -> f64 {
         ratio(self.tp as f64, self.truths())
     }
 
-    /// Fraction of the reports that were matched.
+    /// Returns the fraction of the reports that were matched.
     pub fn precision(&self) -> f64 {
         ratio(self.tp as f64, (self.tp + self.fp) as f64)
     }
 
-    /// Wrong reports per frame.
+    /// Returns the number of false positives per frame.
     pub fn fp_per_frame(&self) -> f64 {
         ratio(self.fp as f64, self.frames as f64)
     }
@@ -114,7 +114,7 @@ impl Clear {
     }
 }
 
-/// State that lasts from frame to frame.
+/// State that is carried from frame to frame.
 struct Run {
     clear: Clear,
     matcher: Matcher,
@@ -124,9 +124,9 @@ struct Run {
     last: Vec<Option<u32>>,
     /// Last truth that each track ever had.
     last_of_track: Vec<Option<u32>>,
-    /// Track that each truth had in the previous frame with anybody in it.
+    /// Track that each truth had in the previous frame that has any truths and reports.
     previous: Vec<Option<u32>>,
-    /// The truths with a track in `previous`.
+    /// The truths that have a track in `previous`.
     held: Vec<u32>,
     matched: Vec<u32>,
     starts: Vec<u32>,
@@ -171,14 +171,13 @@ impl Run {
     }
 
     fn score_pairs(&mut self, frame: &PreparedFrame) {
-        // The tolerance of TrackEval: a similarity of exactly one half is a match in spite of
-        // rounding.
+        // TrackEval's tolerance: a similarity of exactly one half is a match in spite of rounding.
         let enough = MATCH_SIMILARITY - f64::EPSILON;
         self.scored.clear();
         for pair in frame.pairs.iter().filter(|pair| pair.weight >= enough) {
             let truth = frame.truths[pair.row as usize] as usize;
             let goes_on = self.previous[truth] == Some(frame.tracks[pair.col as usize]);
-            // A pair that goes on outweighs any set of new ones, as CLEAR MOT demands.
+            // A continued pair outweighs any set of new ones, as CLEAR MOT demands.
             let bonus = if goes_on { CONTINUATION } else { 0.0 };
             self.scored.push(Edge { weight: pair.weight + bonus, ..*pair });
         }
@@ -207,8 +206,7 @@ impl Run {
             self.starts[truth] += u32::from(self.previous[truth].is_none());
             self.matched[truth] += 1;
         }
-        // Only a match in the frame before continues: the others are forgotten, but not for
-        // switches.
+        // Only a match in the previous frame continues. Older matches count for switches only.
         for truth in self.held.drain(..) {
             self.previous[truth as usize] = None;
         }

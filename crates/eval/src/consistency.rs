@@ -1,13 +1,12 @@
 use serde::{Deserialize, Serialize};
 use statrs::function::gamma::checked_gamma_lr;
 
-/// Whether a filter's covariance fits its errors.
+/// Consistency of a filter: whether its covariance agrees with its errors.
 ///
-/// The squares of innovations (NIS) or errors (NEES), each divided by its
-/// covariance, follow a chi-square distribution with as many degrees of freedom
-/// as they have components, if the filter is honest (Bar-Shalom, Li and
-/// Kirubarajan, 2001, section 5.4). A mean above the bounds says that the filter
-/// is too sure of itself, one below that it is too timid.
+/// The squares of innovations (NIS) or errors (NEES), normalised by their covariance, follow a
+/// chi-square distribution with as many degrees of freedom as they have components, if the filter
+/// is consistent (Bar-Shalom, Li and Kirubarajan, 2001, section 5.4). With a mean above the bounds
+/// the filter is overconfident, with one below them it is too cautious.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Consistency {
@@ -26,9 +25,9 @@ pub struct Consistency {
 }
 
 impl Consistency {
-    /// Summary of NIS or NEES values with `freedom` degrees of freedom each and
-    /// bounds at this confidence (between 0 and 1). The bounds take the values
-    /// as independent. Nothing without values or degrees of freedom.
+    /// Summarises NIS or NEES values with `freedom` degrees of freedom each. The bounds have this
+    /// confidence level (between 0 and 1), and assume that the values are independent. `None`
+    /// without values or degrees of freedom.
     pub fn of(values: &[f64], freedom: u32, confidence: f64) -> Option<Self> {
         if values.is_empty() || freedom == 0 {
             return None;
@@ -48,8 +47,8 @@ impl Consistency {
     }
 }
 
-/// The value that a chi-square variable stays below with a probability; nothing
-/// unless the probability lies within 0 and 1 and there is some freedom.
+/// Returns the quantile of a chi-square distribution; `None` unless the probability lies within 0
+/// and 1 and the degrees of freedom are positive.
 ///
 /// ```
 /// let bound = tagalong_eval::chi_square_quantile(0.95, 2.0).unwrap();
@@ -67,7 +66,7 @@ pub fn chi_square_quantile(probability: f64, freedom: f64) -> Option<f64> {
     Some(bisect(0.0, high, |x| chi_square_below(x, freedom) < probability))
 }
 
-/// The probability that a chi-square variable lies below a value.
+/// Returns the probability that a chi-square variable lies below a value.
 fn chi_square_below(x: f64, freedom: f64) -> f64 {
     if x <= 0.0 {
         return 0.0;
@@ -75,7 +74,7 @@ fn chi_square_below(x: f64, freedom: f64) -> f64 {
     checked_gamma_lr(0.5 * freedom, 0.5 * x).unwrap_or(1.0)
 }
 
-/// The point in between where `too_low` turns from true to false.
+/// Returns the point between the bounds where `too_low` turns from true to false.
 fn bisect(mut low: f64, mut high: f64, too_low: impl Fn(f64) -> bool) -> f64 {
     loop {
         let middle = 0.5 * (low + high);

@@ -1,8 +1,8 @@
-/// Why a sequence cannot be scored.
+/// Reason why a sequence cannot be scored.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EvalError {
-    /// The same id stands twice in one frame.
+    /// The same ID occurs twice in one frame.
     #[error(
         "sequence `{sequence}`, frame {frame} (1-based): {side} id {id} occurs twice; \
          an id must be unique within a frame, so renumber or drop one of them"
@@ -14,10 +14,10 @@ pub enum EvalError {
         frame: usize,
         /// `truth` or `track`.
         side: &'static str,
-        /// The id.
+        /// The ID.
         id: i64,
     },
-    /// A place of the kind that the similarity compares is missing.
+    /// A region or position that the similarity compares is missing.
     #[error(
         "sequence `{sequence}`, frame {frame} (1-based): {side} id {id} has no {what}; \
          score with the other similarity or supply it"
@@ -29,7 +29,7 @@ pub enum EvalError {
         frame: usize,
         /// `truth` or `track`.
         side: &'static str,
-        /// The id.
+        /// The ID.
         id: i64,
         /// `image region` or `floor position`.
         what: &'static str,
@@ -46,10 +46,10 @@ pub enum EvalError {
         frame: usize,
         /// `truth` or `track`.
         side: &'static str,
-        /// The id.
+        /// The ID.
         id: i64,
     },
-    /// The frames are not in the order of time.
+    /// The frames are not in chronological order.
     #[error(
         "sequence `{sequence}`, frame {frame} (1-based) is older than the one before; sort the \
          frames by stamp"

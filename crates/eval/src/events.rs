@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 use crate::clear::Match;
 use crate::prepare::{Prepared, PreparedFrame};
 
-/// Something worth looking at in a recording.
+/// An event in a recording that deserves a closer look.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct Event {
     /// 1-based index of the frame in which it begins.
@@ -14,12 +14,12 @@ pub struct Event {
     pub kind: EventKind,
 }
 
-/// Kinds of events; ids are those of the truth and of the tracks.
+/// Kinds of events. IDs are those of the truth and of the tracks.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "what")]
 #[non_exhaustive]
 pub enum EventKind {
-    /// A person begins to be missed.
+    /// A person is no longer matched.
     Miss {
         /// The person.
         person: i64,
@@ -33,22 +33,22 @@ pub enum EventKind {
         /// The track.
         track: i64,
     },
-    /// A person goes on under another track.
+    /// The track of a person changes.
     Switch {
         /// The person.
         person: i64,
         /// The track before.
         from: i64,
-        /// The track from now on.
+        /// The new track.
         to: i64,
     },
-    /// A track moves to another person than the one it began with.
+    /// A track is matched with another person than its first one.
     WrongPerson {
         /// The track.
         track: i64,
-        /// Person that it began with.
+        /// Its first person.
         began_with: i64,
-        /// Person that it is on now.
+        /// Its present person.
         person: i64,
     },
     /// A track begins where there is no person.
@@ -58,7 +58,7 @@ pub enum EventKind {
     },
 }
 
-/// Lists the events, in the order of time, from the matches of CLEAR MOT.
+/// Lists the events in chronological order, from the matches of CLEAR MOT.
 pub fn events(prepared: &Prepared, matches: &[Vec<Match>]) -> Vec<Event> {
     let mut watch = Watch {
         prepared,
@@ -79,7 +79,7 @@ pub fn events(prepared: &Prepared, matches: &[Vec<Match>]) -> Vec<Event> {
     all
 }
 
-/// Where a track is.
+/// The match of a track.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Whereabouts {
     NotYet,
@@ -145,7 +145,7 @@ impl Watch<'_> {
             match place {
                 _ if place == before => {}
                 Whereabouts::On(truth) => {
-                    // The first person of a track is its own; only others are wrong.
+                    // The first person of a track is its own; only later ones are wrong.
                     let first = *self.began_with[index as usize].get_or_insert(truth);
                     if first != truth {
                         let began_with = self.person_id(first);

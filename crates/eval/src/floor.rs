@@ -1,23 +1,23 @@
-//! CLEAR figures on the floor, scan by scan, as the benchmark of leg trackers counts them (A. Leigh,
+//! CLEAR figures on the floor, scan by scan, counted as in the benchmark of leg trackers (A. Leigh,
 //! J. Pineau, N. Olmedo, H. Zhang, ICRA 2015; K. Bernardin, R. Stiefelhagen, 2008).
 //!
-//! It differs from [`crate::Clear`]: distances are cut and not turned into similarities, a pair is
-//! kept while both are near each other, is remembered while one of them is unseen, and a match that
-//! is a switch is not valid.
+//! The count differs from [`crate::Clear`]: distances have a cutoff and are not turned into
+//! similarities; a pair is kept while both are near each other, and is remembered while one of them
+//! is missing; a match that is a switch is not valid.
 
 use std::collections::BTreeMap;
 
 use crate::{Edge, Interval, Matcher, clustered_share, mean_interval, ratio};
 
-/// Weight that exceeds every distance, m, so that as many pairs as possible are assigned.
+/// Weight larger than any distance, m, so that as many pairs as possible are assigned.
 const FAR_M: f64 = 1e4;
 
-/// Person or track at a place on the floor.
+/// Position of a person or a track on the floor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FloorPoint {
-    /// Number of the person or of the track.
+    /// ID of the person or of the track.
     pub id: i64,
-    /// Place, m.
+    /// Position, m.
     pub at_m: [f64; 2],
 }
 
@@ -45,9 +45,9 @@ pub struct FloorClear {
     pub valid: u64,
     /// Matches of a person or an estimate that was last paired with another one.
     pub switches: u64,
-    /// People without an estimate.
+    /// People without an estimate, over all scans.
     pub misses: u64,
-    /// Estimates without a person.
+    /// Estimates without a person, over all scans.
     pub false_positives: u64,
     /// Number of estimates in all scans.
     pub estimates: u64,
@@ -61,7 +61,7 @@ pub struct FloorClear {
     pub found_by_scan: Vec<[u64; 2]>,
 }
 
-/// Counter that goes through the scans of a log.
+/// Counter for the scans of a log, in their order.
 #[derive(Debug)]
 pub struct FloorTally {
     cut_m: f64,
@@ -72,7 +72,7 @@ pub struct FloorTally {
 }
 
 impl FloorTally {
-    /// Starts with no scans; pairs are no farther apart than `cut_m`.
+    /// Creates a counter without scans. Pairs are at most `cut_m` apart, m.
     pub fn new(cut_m: f64) -> Self {
         Self {
             cut_m,
@@ -123,7 +123,8 @@ impl FloorTally {
         let kept = people.filter_map(|(index, person)| {
             let last = self.estimate_of.get(&person.id)?;
             let estimate = scan.estimates.iter().position(|e| e.id == *last)?;
-            // A pair that one side has left since would undo a later match.
+            // If one side has been paired with another since, the old pair would undo that later
+            // match.
             let is_mutual = self.person_of.get(last) == Some(&person.id);
             let is_near = apart(person, &scan.estimates[estimate]) <= self.cut_m;
             (is_mutual && is_near).then_some((index, estimate))
@@ -131,13 +132,13 @@ impl FloorTally {
         kept.collect()
     }
 
-    /// Assigns the rest by the least sum of distances, and drops what is too far apart.
+    /// Assigns the rest with the least sum of distances, and drops pairs that are too far apart.
     fn assigned(&mut self, scan: &FloorScan, kept: &[(usize, usize)]) -> Vec<(usize, usize)> {
         let mut edges = Vec::new();
         for (row, person) in scan.people.iter().enumerate() {
             for (col, estimate) in scan.estimates.iter().enumerate() {
                 if kept.iter().all(|pair| pair.0 != row && pair.1 != col) {
-                    // The matcher maximises, and distances are to be small.
+                    // The matcher maximises weights, but distances are to be minimised.
                     let weight = FAR_M - apart(person, estimate);
                     edges.push(Edge { row: row as u32, col: col as u32, weight });
                 }
@@ -184,8 +185,8 @@ impl FloorClear {
         (matches > 0).then(|| self.distance_sum_m / matches as f64)
     }
 
-    /// Returns the share of the objects with a valid match; its interval is by the spread between
-    /// people or, where there is one person, between blocks of `block` scans.
+    /// Returns the fraction of the objects with a valid match. Its interval comes from the spread
+    /// between people or, with a single person, between blocks of `block` scans.
     pub fn recall(&self, block: usize) -> Option<Interval> {
         let blocks = self.found_by_scan.chunks(block.max(1)).map(|scans| {
             scans.iter().fold([0, 0], |sum, [found, of]| [sum[0] + found, sum[1] + of])
@@ -197,13 +198,13 @@ impl FloorClear {
         clustered_share(&clusters)
     }
 
-    /// Returns the number of estimates a scan.
+    /// Returns the number of estimates per scan.
     pub fn estimates_per_scan(&self) -> f64 {
         ratio(self.estimates as f64, self.scans as f64)
     }
 
-    /// Returns the number of false positives a minute; its interval is by the spread between blocks
-    /// of `block` scans. The scans lie `scan_s` seconds apart.
+    /// Returns the number of false positives per minute. Its interval comes from the spread between
+    /// blocks of `block` scans. The scans are `scan_s` seconds apart.
     pub fn false_per_minute(&self, block: usize, scan_s: f64) -> Option<Interval> {
         let blocks = self.false_by_scan.chunks(block.max(1));
         let rates: Vec<f64> = blocks.map(|scans| minute_rate(scans, scan_s)).collect();
@@ -213,7 +214,7 @@ impl FloorClear {
     }
 }
 
-/// The mean count of a minute, from the counts of scans that take this time each.
+/// Returns the mean count per minute, from the counts of scans that take `scan_s` seconds each.
 fn minute_rate(scans: &[u64], scan_s: f64) -> f64 {
     scans.iter().sum::<u64>() as f64 * 60.0 / (scans.len().max(1) as f64 * scan_s)
 }

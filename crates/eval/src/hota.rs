@@ -8,7 +8,7 @@ use tagalong_math::matching::{Edge, Matcher};
 /// Number of similarity thresholds.
 pub const LEVELS: usize = 19;
 
-/// The threshold of a level: 0.05, 0.10, ... 0.95.
+/// Returns the threshold of a level: 0.05, 0.10, ... 0.95.
 pub fn alpha(level: usize) -> f64 {
     0.05 + level as f64 * 0.05
 }
@@ -34,43 +34,43 @@ pub struct HotaLevel {
 }
 
 impl HotaLevel {
-    /// Detection accuracy: `TP / (TP + FN + FP)`.
+    /// Returns the detection accuracy `TP / (TP + FN + FP)`.
     pub fn det_a(&self) -> f64 {
         ratio(self.tp as f64, (self.tp + self.fn_ + self.fp) as f64)
     }
 
-    /// Association accuracy, mean over the matches.
+    /// Returns the association accuracy, the mean over the matches.
     pub fn ass_a(&self) -> f64 {
         ratio(self.association_sum, self.tp as f64)
     }
 
-    /// `sqrt(DetA * AssA)`.
+    /// Returns `sqrt(DetA * AssA)`.
     pub fn hota(&self) -> f64 {
         (self.det_a() * self.ass_a()).sqrt()
     }
 
-    /// Mean similarity of the matches; 1 without any, as in TrackEval.
+    /// Returns the mean similarity of the matches; 1 without any, as in TrackEval.
     pub fn loc_a(&self) -> f64 {
-        // TrackEval's guard against a division by 0, kept for equal digits.
+        // TrackEval's guard against a division by 0, kept so that the digits agree.
         self.similarity_sum.max(1e-10) / (self.tp as f64).max(1e-10)
     }
 
-    /// Detection recall.
+    /// Returns the detection recall.
     pub fn det_re(&self) -> f64 {
         ratio(self.tp as f64, (self.tp + self.fn_) as f64)
     }
 
-    /// Detection precision.
+    /// Returns the detection precision.
     pub fn det_pr(&self) -> f64 {
         ratio(self.tp as f64, (self.tp + self.fp) as f64)
     }
 
-    /// Association recall, mean over the matches.
+    /// Returns the association recall, the mean over the matches.
     pub fn ass_re(&self) -> f64 {
         ratio(self.association_recall_sum, self.tp as f64)
     }
 
-    /// Association precision, mean over the matches.
+    /// Returns the association precision, the mean over the matches.
     pub fn ass_pr(&self) -> f64 {
         ratio(self.association_precision_sum, self.tp as f64)
     }
@@ -98,9 +98,9 @@ pub struct Hota {
 }
 
 impl Hota {
-    /// Scores one sequence. The matching does not depend on the threshold, so
-    /// it is done once; each match is then filed under the highest threshold
-    /// that it passes, and sums from above give all nineteen.
+    /// Scores one sequence. The matching does not depend on the threshold, so it is computed once;
+    /// each match is counted at the highest threshold that it passes, and cumulative sums then give
+    /// all nineteen levels.
     pub fn measure(prepared: &Prepared, table: &PairTable) -> Self {
         let alignment = alignment(prepared, table);
         let mut run = Run {
@@ -119,14 +119,14 @@ impl Hota {
         run.finish(prepared, table)
     }
 
-    /// The figures of several sequences together; each match weighs the same.
+    /// Combines several sequences; each match has the same weight.
     pub fn combine<'a>(all: impl IntoIterator<Item = &'a Self>) -> Self {
         all.into_iter().fold(Self::default(), |sum, one| Self {
             levels: std::array::from_fn(|a| sum.levels[a].plus(&one.levels[a])),
         })
     }
 
-    /// Mean of a figure over the thresholds.
+    /// Returns the mean of a figure over the thresholds.
     ///
     /// ```
     /// use tagalong_eval::{Hota, HotaLevel};
@@ -138,8 +138,8 @@ impl Hota {
 }
 
 /// Computes the alignment of each pair over the whole sequence, 0 to 1: the soft Jaccard index of
-/// their frames (Luiten et al., section 5; as in TrackEval a similarity is first divided by all
-/// that compete with it).
+/// their frames (Luiten et al., section 5; as in TrackEval, a similarity is first divided by the
+/// sum of all that compete with it).
 fn alignment(prepared: &Prepared, table: &PairTable) -> Vec<f64> {
     let mut together = vec![0.0; table.pairs.len()];
     let mut of_row = Vec::new();
@@ -149,7 +149,7 @@ fn alignment(prepared: &Prepared, table: &PairTable) -> Vec<f64> {
         sums(frame, &mut of_row, &mut of_col);
         for (pair, &index) in frame.pairs.iter().zip(&mut indices) {
             let rivals = of_col[pair.col as usize] + of_row[pair.row as usize] - pair.weight;
-            // A similarity of 0 to all others leaves 0 / 0.
+            // Without any similarity to others this would be 0 / 0.
             if rivals > f64::EPSILON {
                 together[index as usize] += pair.weight / rivals;
             }
@@ -157,14 +157,14 @@ fn alignment(prepared: &Prepared, table: &PairTable) -> Vec<f64> {
     }
     let pairs = table.pairs.iter().zip(together);
     let jaccard = pairs.map(|(&(truth, track), both)| {
-        // Jaccard: both over either, each frame weighted by its share.
+        // Jaccard index: the intersection over the union, in frames weighted by their share.
         let either = prepared.truth_frames[truth as usize] + prepared.track_frames[track as usize];
         both / (f64::from(either) - both)
     });
     jaccard.collect()
 }
 
-/// Sums of the similarities in each row and column.
+/// Sums the similarities in each row and column.
 fn sums(frame: &PreparedFrame, of_row: &mut Vec<f64>, of_col: &mut Vec<f64>) {
     of_row.clear();
     of_row.resize(frame.truths.len(), 0.0);
@@ -180,7 +180,7 @@ struct Run {
     matcher: Matcher,
     scored: Vec<Edge>,
     chosen: Vec<u32>,
-    /// For each pair the number of matches whose highest threshold is the level.
+    /// For each pair, the number of matches whose highest threshold is the level.
     matches: Vec<[u32; LEVELS]>,
     hota: Hota,
 }
@@ -189,14 +189,14 @@ impl Run {
     fn step(&mut self, frame: &PreparedFrame, pair_of: &[u32], alignment: &[f64]) {
         let truths = frame.truths.len();
         let tracks = frame.tracks.len();
-        // All are wrong at first; `add` takes the matched ones away again.
+        // At first all are unmatched; `add` removes the matched ones again.
         for level in &mut self.hota.levels {
             level.fn_ += truths as u64;
             level.fp += tracks as u64;
         }
         self.scored.clear();
         self.scored.extend(frame.pairs.iter().zip(pair_of).map(|(pair, &index)| Edge {
-            // Weighted by the global alignment, so that pairs that last are preferred (Luiten et
+            // Weighted by the global alignment, so that long-lived pairs are preferred (Luiten et
             // al.).
             weight: alignment[index as usize] * pair.weight,
             ..*pair
@@ -212,7 +212,7 @@ impl Run {
     }
 
     fn finish(mut self, prepared: &Prepared, table: &PairTable) -> Hota {
-        // A match at a level is one at all lower levels, too.
+        // A match at a level is also a match at all lower levels.
         for level in (0..LEVELS - 1).rev() {
             self.hota.levels[level].similarity_sum += self.hota.levels[level + 1].similarity_sum;
         }
@@ -230,7 +230,8 @@ impl Run {
 }
 
 impl HotaLevel {
-    /// Adds a pair that is matched in `both` of the frames that each of the two has.
+    /// Adds a pair that is matched in `both` frames, of the `of_truth` and `of_track` frames of its
+    /// two sides.
     fn add(&mut self, both: u32, of_truth: u32, of_track: u32) {
         let n = f64::from(both);
         let truth = f64::from(of_truth);
@@ -244,7 +245,7 @@ impl HotaLevel {
     }
 }
 
-/// The highest level whose threshold the similarity reaches.
+/// Returns the highest level whose threshold the similarity reaches.
 fn highest_level(similarity: f64) -> Option<usize> {
     (0..LEVELS).rev().find(|&level| similarity >= alpha(level) - f64::EPSILON)
 }

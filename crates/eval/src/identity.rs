@@ -6,9 +6,8 @@ use crate::prepare::Prepared;
 use crate::ratio;
 use tagalong_math::matching::Matcher;
 
-/// The identity counts (Ristani et al., ECCV 2016 workshops): each truth is
-/// given one track for the whole sequence so that as many frames as possible
-/// agree.
+/// The identity counts (Ristani et al., ECCV 2016 workshops): each truth is assigned one track for
+/// the whole sequence so that as many frames as possible agree.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 pub struct Identity {
     /// Frames in which a truth was matched by its own track.
@@ -35,7 +34,7 @@ impl Identity {
         Self { tp, fn_: prepared.truth_count() - tp, fp: prepared.report_count() - tp }
     }
 
-    /// The counts of several sequences together.
+    /// Combines the counts of several sequences.
     pub fn combine<'a>(all: impl IntoIterator<Item = &'a Self>) -> Self {
         all.into_iter().fold(Self::default(), |a, b| Self {
             tp: a.tp + b.tp,
@@ -44,17 +43,17 @@ impl Identity {
         })
     }
 
-    /// Harmonic mean of identity precision and recall.
+    /// Returns the harmonic mean of identity precision and recall.
     pub fn idf1(&self) -> f64 {
         ratio(self.tp as f64, self.tp as f64 + 0.5 * (self.fp + self.fn_) as f64)
     }
 
-    /// Identity precision.
+    /// Returns the identity precision.
     pub fn idp(&self) -> f64 {
         ratio(self.tp as f64, (self.tp + self.fp) as f64)
     }
 
-    /// Identity recall.
+    /// Returns the identity recall.
     pub fn idr(&self) -> f64 {
         ratio(self.tp as f64, (self.tp + self.fn_) as f64)
     }

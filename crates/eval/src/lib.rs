@@ -1,7 +1,7 @@
 //! Pure tracking and detection metrics.
 //!
 //! A [`Sequence`] holds frames, a [`Frame`] holds the people in it ([`Truth`]) and the tracks that
-//! were reported ([`Report`]); the metrics compare the two, either in the image (intersection over
+//! were reported ([`Report`]). The metrics compare the two, either in the image (intersection over
 //! union) or on the floor (metres). Nothing here reads a file or a clock: the text formats in
 //! [`formats`] work on strings.
 //!
@@ -22,23 +22,24 @@
 //!
 //! # Which figure for what
 //!
-//! * [`Hota`], [`Clear`], [`Identity`]: tracking, equal to TrackEval's figures.
+//! * [`Hota`], [`Clear`], [`Identity`]: tracking; the figures agree with those of TrackEval.
 //! * [`DetectionTally`]: single detections; the miss-rate curve and its average.
-//! * [`SetTally`]: OSPA and GOSPA, one number for place and count errors.
-//! * [`PositionError`], [`Times`], [`Following`]: figures that matter to a robot.
-//! * [`FloorClear`]: CLEAR on the floor with a cut in metres, as benchmarks of leg trackers count.
-//! * [`events`]: when and where it went wrong, for a list to look through.
-//! * [`repairs`]: HOTA, MOTA and IDF1 if one kind of error were repaired: where work pays.
+//! * [`SetTally`]: OSPA and GOSPA, one number for errors of position and of count.
+//! * [`PositionError`], [`Times`], [`Following`]: figures that matter for a robot.
+//! * [`FloorClear`]: CLEAR on the floor with a cutoff in metres, as in benchmarks of leg trackers.
+//! * [`events`]: a list of the errors with their times, to look through.
+//! * [`repairs`]: HOTA, MOTA and IDF1 if one kind of error were repaired, which shows where work
+//!   pays.
 //! * [`Consistency`]: whether the covariance of a filter agrees with its errors.
 //! * [`draws_interval`], [`mean_interval`], [`wilson`], [`clustered_share`]: the uncertainty of a
 //!   figure; [`paired_gain`], [`holm`]: that of a difference.
 //!
 //! # Why similarities are computed once
 //!
-//! All families look at the same pairs. [`Prepared`] leaves out the parts that must not count,
-//! numbers the ids densely and keeps only the pairs that are alike at all, some per person;
-//! everything after that works on short lists. Scoring is so cheap that it can stand inside a
-//! jackknife or a parameter search.
+//! All metrics use the same pairs. [`Prepared`] removes everything that does not count, numbers the
+//! IDs densely and keeps only the pairs with some similarity, a few per person; everything after
+//! that works on short lists. Scoring is so fast that it can run inside a jackknife or a parameter
+//! search.
 
 mod clear;
 mod consistency;
@@ -82,7 +83,7 @@ pub use times::{Following, Times};
 pub use types::{Frame, Region, Report, Role, Sequence, Similarity, Truth, View};
 pub use visibility::{FREE, Found, NEAR_M, PARTLY, VisibilityTally};
 
-/// A ratio of counts, with a denominator of at least one.
+/// Returns a ratio of counts, with a denominator of at least one.
 fn ratio(part: f64, whole: f64) -> f64 {
     part / whole.max(1.0)
 }

@@ -7,51 +7,51 @@ use crate::types::{Frame, Region, Report, Role, Sequence, Similarity, Truth};
 pub const REFERENCE_FPPI: [f64; 9] =
     [0.01, 0.0178, 0.0316, 0.0562, 0.1, 0.1778, 0.3162, 0.5623, 1.0];
 
-/// The least miss rate that enters the logarithm.
+/// Lowest miss rate that enters the logarithm.
 const FLOOR: f64 = 1e-10;
 
-/// Every detection with its score and its correctness: the data of the miss-rate and the
+/// Every detection with its score and its correctness: the data of the miss-rate curve and of the
 /// precision-recall curve.
 ///
-/// The protocol is that of the Caltech benchmark (Dollár et al., PAMI 2012): detections in
-/// descending score each take the best free truth, a real one before an ignored one; an ignored
-/// truth absorbs any number of detections, and the overlap with it is taken over the detection's
-/// own area.
+/// The protocol is that of the Caltech benchmark (Dollár et al., PAMI 2012): detections in order of
+/// descending score each take the best free truth, a counted one before an ignored one. An ignored
+/// truth absorbs any number of detections; the overlap with it is relative to the area of the
+/// detection.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct DetectionTally {
-    /// Score and verdict of each detection that counts.
+    /// Scores and verdicts of the detections that count.
     pub verdicts: Vec<Verdict>,
     /// Truths that count.
     pub truths: u64,
-    /// Images, those without anybody included.
+    /// Number of images, including those without people.
     pub images: u64,
 }
 
-/// A detection that counts.
+/// Result for one detection that counts.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Verdict {
     /// Confidence of the detector.
     pub score: f64,
-    /// Whether it found a truth of its own.
+    /// True if it is matched with a truth of its own.
     pub right: bool,
 }
 
-/// Point of the curve: the result of accepting all detections from a score on.
+/// Point of the curve: the result of accepting all detections with at least this score.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub struct CurvePoint {
-    /// The least score accepted.
+    /// Lowest accepted score.
     pub score: f64,
     /// False positives per image.
     pub fppi: f64,
-    /// Fraction of the truths that is missed.
+    /// Fraction of the truths that are missed.
     pub miss_rate: f64,
-    /// Fraction of the accepted detections that is right.
+    /// Fraction of the accepted detections that are right.
     pub precision: f64,
 }
 
 impl DetectionTally {
-    /// Judges the reports of a sequence as single detections; `at_least` is the
-    /// similarity that a match needs (0.5 in the protocol).
+    /// Scores the reports of a sequence as single detections; `at_least` is the minimum similarity
+    /// of a match (0.5 in the protocol).
     pub fn measure(sequence: &Sequence, similarity: Similarity, at_least: f64) -> Self {
         let mut tally = Self { images: sequence.frames.len() as u64, ..Self::default() };
         for frame in &sequence.frames {
@@ -60,7 +60,7 @@ impl DetectionTally {
         tally
     }
 
-    /// All detections of several sequences together.
+    /// Combines the detections of several sequences.
     pub fn combine<'a>(all: impl IntoIterator<Item = &'a Self>) -> Self {
         all.into_iter().fold(Self::default(), |mut sum, one| {
             sum.verdicts.extend_from_slice(&one.verdicts);
@@ -90,15 +90,15 @@ impl DetectionTally {
         }
     }
 
-    /// The curve from the highest score to the lowest, one point for each
-    /// distinct score: no threshold lies between equal ones.
+    /// Returns the curve from the highest score to the lowest, with one point for each distinct
+    /// score, because no threshold lies between equal ones.
     pub fn curve(&self) -> Vec<CurvePoint> {
         let mut sorted = self.verdicts.clone();
         sorted.sort_by(|a, b| b.score.total_cmp(&a.score));
         let mut right = 0_u64;
         let mut wrong = 0_u64;
         let mut points = Vec::new();
-        // Detections of equal score are accepted together: their order means nothing.
+        // Detections of equal score are accepted together, because their order has no meaning.
         for equal in sorted.chunk_by(|a, b| a.score == b.score) {
             let found = equal.iter().filter(|v| v.right).count() as u64;
             right += found;
@@ -113,9 +113,9 @@ impl DetectionTally {
         points
     }
 
-    /// The log-average miss rate, 0 to 1: the geometric mean of the miss rate at
-    /// the [`REFERENCE_FPPI`], each read at the last point of the curve that is
-    /// not beyond it (1 if there is none). Nothing where there is no truth.
+    /// Returns the log-average miss rate, 0 to 1: the geometric mean of the miss rates at the
+    /// [`REFERENCE_FPPI`], each read at the last point of the curve that does not exceed it (1 if
+    /// there is none). `None` without truths.
     pub fn log_average_miss_rate(&self) -> Option<f64> {
         if self.truths == 0 {
             return None;
@@ -126,14 +126,14 @@ impl DetectionTally {
             // Left of the curve all people are missed, as in the Caltech benchmark.
             let within = curve.partition_point(|point| point.fppi <= fppi);
             let rate = within.checked_sub(1).map_or(1.0, |last| curve[last].miss_rate);
-            // The logarithm of a miss rate of 0 is infinite.
+            // Guards against a miss rate of 0, whose logarithm is infinite.
             sum += rate.max(FLOOR).ln();
         }
         Some((sum / REFERENCE_FPPI.len() as f64).exp())
     }
 
-    /// Returns how many different scores there are. With a single one no threshold tells
-    /// some detections from others: the curve is a point, and its averages say nothing.
+    /// Returns the number of distinct scores. With a single one, no threshold separates some
+    /// detections from others: the curve is one point, and its averages have no meaning.
     pub fn distinct_scores(&self) -> usize {
         let mut scores: Vec<f64> = self.verdicts.iter().map(|verdict| verdict.score).collect();
         scores.sort_by(f64::total_cmp);
@@ -141,8 +141,8 @@ impl DetectionTally {
         scores.len()
     }
 
-    /// Area under the precision-recall curve, precision made monotone from the
-    /// right (all-point interpolation, Pascal VOC 2010). Nothing without truth.
+    /// Returns the area under the precision-recall curve, with the precision made monotonic from
+    /// the right (all-point interpolation, Pascal VOC 2010). `None` without truths.
     pub fn average_precision(&self) -> Option<f64> {
         if self.truths == 0 {
             return None;
@@ -188,7 +188,8 @@ impl Judge {
         }) || frame.ignore_regions.iter().any(|region| self.is_inside(report, region))
     }
 
-    /// Over the detection's own area: an ignored truth may hold a whole crowd.
+    /// Returns true if the report overlaps this ignored truth enough. The overlap is relative to
+    /// the area of the report, because an ignored truth may contain a whole crowd.
     fn is_inside(&self, report: &Report, region: &Region) -> bool {
         report.region.is_some_and(|r| r.covered_by(region) >= self.at_least)
     }

@@ -1,8 +1,8 @@
 use crate::prepare::Prepared;
 use tagalong_math::matching::Edge;
 
-/// All pairs of a truth and a track that are alike in any frame, numbered, so
-/// that counts per pair are plain lists and the inner loops need no hashing.
+/// All pairs of a truth and a track that have some similarity in any frame. The pairs are numbered,
+/// so that counts per pair are plain lists and the inner loops need no hashing.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 pub struct PairTable {
@@ -35,7 +35,7 @@ impl PairTable {
         Self { pairs: pairs.collect(), pair_of }
     }
 
-    /// In how many frames each pair passes the test.
+    /// Returns the number of frames in which each pair passes the test.
     pub(crate) fn count(&self, prepared: &Prepared, test: impl Fn(&Edge) -> bool) -> Vec<u32> {
         let mut counts = vec![0; self.pairs.len()];
         let all = prepared.frames.iter().flat_map(|frame| &frame.pairs);
@@ -45,7 +45,7 @@ impl PairTable {
         counts
     }
 
-    /// One edge for each pair, weighted by its index.
+    /// Returns one edge for each pair, weighted by its index.
     pub(crate) fn edges(&self, weight: impl Fn(usize) -> f64) -> Vec<Edge> {
         let pairs = self.pairs.iter().enumerate();
         pairs.map(|(index, &(row, col))| Edge { row, col, weight: weight(index) }).collect()

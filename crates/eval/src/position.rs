@@ -5,7 +5,7 @@ use crate::clear::Match;
 use crate::prepare::Prepared;
 use crate::types::{Sequence, distance_m};
 
-/// Errors of the reported places of matched people, in metres on the floor.
+/// Errors of the reported positions of matched people, in metres on the floor.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct PositionError {
@@ -22,7 +22,7 @@ pub struct PositionError {
 }
 
 impl PositionError {
-    /// Summary of single errors; nothing if there are none.
+    /// Summarises single errors; `None` if there are none.
     ///
     /// ```
     /// use tagalong_eval::PositionError;
@@ -42,7 +42,8 @@ impl PositionError {
     }
 }
 
-/// The distance of each match, in metres; matches without both places are left out.
+/// Returns the distance of each match, in metres, without the matches in which a position is
+/// missing.
 pub fn position_errors_m(
     sequence: &Sequence,
     prepared: &Prepared,

@@ -2,19 +2,19 @@ use crate::error::EvalError;
 use crate::types::{Frame, Report, Role, Sequence, Similarity, Truth};
 use tagalong_math::matching::{Edge, Matcher};
 
-/// Comparison of truth and reports before anything is counted.
+/// Rules for comparing truth and reports before anything is counted.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Comparison {
     /// Similarity of a truth and a report.
     pub similarity: Similarity,
-    /// Similarity from which on a report that matches an ignored truth is left
-    /// out; 0.5 as in TrackEval.
+    /// Minimum similarity at which a report that matches an ignored truth is left out; 0.5 as in
+    /// TrackEval.
     pub ignore_similarity: f64,
     /// Fraction of an unmatched report inside an ignore region above which it
     /// is left out; 0.5 as in TrackEval's KITTI rules.
     pub ignore_covered: f64,
-    /// Unmatched reports at most this high are left out, in pixels; 25 in
-    /// TrackEval's KITTI rules, otherwise absent.
+    /// Unmatched reports of at most this height are left out, in pixels; 25 in TrackEval's KITTI
+    /// rules, otherwise absent.
     pub ignore_unmatched_below_px: Option<f64>,
 }
 
@@ -38,49 +38,49 @@ impl From<Similarity> for Comparison {
 /// Frame without the ignored truths and reports.
 #[derive(Clone, Debug, Default)]
 pub struct PreparedFrame {
-    /// When, in nanoseconds.
+    /// Time, in nanoseconds.
     pub stamp_ns: i64,
     /// People, as indices into [`Prepared::truth_ids`].
     pub truths: Vec<u32>,
     /// Reports, as indices into [`Prepared::track_ids`].
     pub tracks: Vec<u32>,
-    /// For each of `truths` its index in the frame of the sequence.
+    /// For each of `truths`, its index in the frame of the sequence.
     pub truth_at: Vec<u32>,
-    /// For each of `tracks` its index in the frame of the sequence.
+    /// For each of `tracks`, its index in the frame of the sequence.
     pub track_at: Vec<u32>,
-    /// All pairs with a similarity above zero, row by row: rows are positions
-    /// in `truths`, columns positions in `tracks`, the weight is the similarity.
+    /// All pairs with a similarity above zero, row by row: rows are indices into `truths`, columns
+    /// indices into `tracks`, the weight is the similarity.
     pub pairs: Vec<Edge>,
 }
 
-/// Sequence made ready for the metrics: ignored truths and the reports on them are removed, ids are
-/// numbered from zero, similarities are computed once.
+/// Sequence prepared for the metrics: ignored truths and the reports on them are removed, IDs are
+/// numbered from zero, and similarities are computed once.
 #[derive(Clone, Debug, Default)]
 pub struct Prepared {
-    /// The truth's ids in ascending order.
+    /// IDs of the truths in ascending order.
     pub truth_ids: Vec<i64>,
-    /// The tracks' ids in ascending order.
+    /// IDs of the tracks in ascending order.
     pub track_ids: Vec<i64>,
     /// The frames.
     pub frames: Vec<PreparedFrame>,
-    /// In how many frames each truth counts.
+    /// Number of frames in which each truth counts.
     pub truth_frames: Vec<u32>,
-    /// In how many frames each track is reported.
+    /// Number of frames in which each track is reported.
     pub track_frames: Vec<u32>,
 }
 
 impl Prepared {
-    /// Compares truth and reports of each frame and leaves out the parts that must not count.
+    /// Compares truth and reports of each frame and removes everything that does not count.
     ///
-    /// As TrackEval does for MOT16 to MOT20 (Milan et al., arXiv 1603.00831, section 4): all truths
-    /// of a frame, whatever their [`Role`], are matched with the reports; a report that goes with
-    /// an ignored truth is left out; then only the truths that count stay. Frames without ignored
-    /// truths need no such matching, which is the MOT15 rule.
+    /// The rules are those of TrackEval for MOT16 to MOT20 (Milan et al., arXiv 1603.00831, section
+    /// 4): all truths of a frame, whatever their [`Role`], are matched with the reports; a report
+    /// that is matched with an ignored truth is removed; then only the truths that count are kept.
+    /// Frames without ignored truths need no such matching, which is the MOT15 rule.
     ///
     /// # Errors
     ///
-    /// When an id occurs twice in a frame, the place that is compared is missing, a number is not
-    /// finite, or the frames are not in order.
+    /// When an ID occurs twice in a frame, the region or position that is compared is missing, a
+    /// number is not finite, or the frames are not in order.
     pub fn new(sequence: &Sequence, comparison: &Comparison) -> Result<Self, EvalError> {
         check(sequence, comparison.similarity)?;
         let mut matcher = Matcher::new();
@@ -104,12 +104,12 @@ impl Prepared {
         Ok(prepared)
     }
 
-    /// Number of truths that count, over all frames.
+    /// Returns the number of truths that count, over all frames.
     pub fn truth_count(&self) -> u64 {
         self.truth_frames.iter().map(|&n| u64::from(n)).sum()
     }
 
-    /// Number of reports that count, over all frames.
+    /// Returns the number of reports that count, over all frames.
     pub fn report_count(&self) -> u64 {
         self.track_frames.iter().map(|&n| u64::from(n)).sum()
     }
@@ -141,13 +141,13 @@ fn unique(
     all
 }
 
-/// All pairs of a frame that are alike at all, row by row.
+/// Returns all pairs of a frame with some similarity, row by row.
 fn similar_pairs(frame: &Frame, similarity: Similarity) -> Vec<Edge> {
     let mut pairs = Vec::new();
     for (row, truth) in frame.truths.iter().enumerate() {
         for (col, report) in frame.reports.iter().enumerate() {
             let weight = similarity.between(truth, report);
-            // Pairs without any similarity are most of all, and none can be matched.
+            // Most pairs have no similarity, and cannot be matched.
             if weight > 0.0 {
                 pairs.push(Edge { row: row as u32, col: col as u32, weight });
             }
@@ -174,7 +174,7 @@ fn reduce(frame: &Frame, comparison: &Comparison, matcher: &mut Matcher) -> Prep
     PreparedFrame { stamp_ns: frame.stamp_ns, truth_at, track_at, pairs, ..Default::default() }
 }
 
-/// The indices that stay, and for each old index its new one.
+/// Returns the indices that are kept, and for each old index its new one.
 fn compact(keep: &[bool]) -> (Vec<u32>, Vec<u32>) {
     let mut stay = Vec::new();
     let mut new = Vec::with_capacity(keep.len());
@@ -209,7 +209,7 @@ fn kept_reports(
         partner[pair.col as usize] = Some(frame.truths[pair.row as usize].role);
     }
     for (col, report) in frame.reports.iter().enumerate() {
-        // A report on an ignored truth is neither right nor wrong.
+        // A report that is matched with an ignored truth is neither right nor wrong.
         keep[col] = match partner[col] {
             Some(role) => role != Role::Ignored,
             None => !excused(report, frame, comparison),
@@ -257,8 +257,8 @@ struct Someone {
     id: i64,
     has_region: bool,
     has_floor: bool,
-    /// True if the place that is compared may be missing; such a truth does not count and excuses
-    /// no report.
+    /// True if the region or position that is compared may be missing; such a truth does not count
+    /// and excuses no report.
     may_lack_place: bool,
     sane: bool,
 }

@@ -10,33 +10,33 @@ use crate::prepare::{Comparison, Prepared, PreparedFrame};
 use crate::scores::Scores;
 use crate::types::{Frame, Region, Report, Sequence, Similarity, Truth};
 
-/// Similarity from which on a report is taken for a badly placed one of a person, and not for a
-/// false one beside a miss.
+/// Similarity from which on a report counts as a badly placed report of a person, and not as a
+/// false positive beside a miss.
 pub const PAIRED_SIMILARITY: f64 = 0.1;
 
-/// Kind of error that the truth repairs.
+/// Kind of error that is repaired with the truth.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Repair {
-    /// Each paired report has the ID of its person.
+    /// Each paired report gets the ID of its person.
     Identities,
-    /// Reports without a person are gone.
+    /// Reports without a person are removed.
     FalseReports,
     /// Each missed person is reported, by the track that the person had before or has next.
     Misses,
-    /// Each paired report has the box, or the place, of its person.
+    /// Each paired report gets the box, or the position, of its person.
     Places,
-    /// The middle of each paired box is as high as that of its person.
+    /// The middle of each paired box gets the height of that of its person.
     Heights,
-    /// The middle of each paired box is as far to the right as that of its person.
+    /// The middle of each paired box gets the horizontal position of that of its person.
     Sideways,
-    /// Each paired box has the size of that of its person, about its own middle.
+    /// Each paired box gets the size of that of its person, about its own middle.
     Sizes,
 }
 
 impl Repair {
-    /// All kinds that make sense with boxes.
+    /// All kinds that apply to boxes.
     pub const ALL: [Self; 7] = [
         Self::Identities,
         Self::FalseReports,
@@ -60,7 +60,7 @@ impl Repair {
         }
     }
 
-    /// Returns true for a repair of boxes, which places on the floor do not have.
+    /// Returns true for a repair of boxes, which positions on the floor do not have.
     fn needs_boxes(self) -> bool {
         matches!(self, Self::Heights | Self::Sideways | Self::Sizes)
     }
@@ -82,9 +82,9 @@ pub struct Repaired {
     pub idf1: Option<f64>,
 }
 
-/// Returns the figures of a sequence with each kind of error repaired alone. In each frame, reports
-/// and people are paired one to one so that their similarities, from [`PAIRED_SIMILARITY`] on, have
-/// the largest sum. Ignored people, and the reports on them, stay as they are.
+/// Returns the figures of a sequence, each time with one kind of error repaired. In each frame,
+/// reports and people are paired one to one so that their similarities, from [`PAIRED_SIMILARITY`]
+/// on, have the largest sum. Ignored people, and the reports on them, stay as they are.
 ///
 /// ```
 /// use tagalong_eval::{Frame, Region, Repair, Report, Sequence, Similarity, Truth, repairs};
@@ -116,16 +116,16 @@ pub fn repairs(sequence: &Sequence, comparison: &Comparison) -> Result<Vec<Repai
     Ok(rows)
 }
 
-/// Reports and people of all frames that belong together.
+/// Pairs of reports and people in all frames.
 struct Pairing {
     frames: Vec<FramePairing>,
-    /// Tracks of each person by time: number of the frame, and ID.
+    /// Tracks of each person in chronological order: index of the frame, and ID.
     tracks_of: BTreeMap<i64, Vec<(usize, i64)>>,
     /// For each person an ID that no report has.
     own_ids: BTreeMap<i64, i64>,
 }
 
-/// Reports and people of one frame, by their places in the frame of the sequence.
+/// Pairs of reports and people in one frame, by their indices in the frame of the sequence.
 #[derive(Default)]
 struct FramePairing {
     /// Reports with their person.
@@ -247,7 +247,7 @@ impl FramePairing {
     }
 }
 
-/// Returns the places that are not marked.
+/// Returns the indices that are not marked.
 fn left(places: &[u32], marked: &[bool]) -> Vec<usize> {
     let unmarked = places.iter().zip(marked).filter(|(_, marked)| !**marked);
     unmarked.map(|(place, _)| *place as usize).collect()
@@ -261,7 +261,7 @@ fn drop_reports(frame: &mut Frame, places: &[usize]) {
     });
 }
 
-/// Repairs one property of a box, and keeps the others.
+/// Repairs one property of a box and keeps the others.
 fn repair_region(region: &mut Region, right: &Region, repair: Repair) {
     let middle_x = region.x + 0.5 * region.width;
     let middle_y = region.y + 0.5 * region.height;

@@ -13,8 +13,8 @@ use crate::times::Times;
 use crate::types::Sequence;
 use crate::visibility::VisibilityTally;
 
-/// Everything counted on one or several sequences, before the figures are
-/// formed: tallies add up, figures do not.
+/// All counts over one or several sequences, from which the figures are computed: counts can be
+/// added, figures cannot.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Tally {
     /// CLEAR MOT.
@@ -31,21 +31,21 @@ pub struct Tally {
     pub position_errors_m: Vec<f64>,
     /// Times.
     pub times: Times,
-    /// Recall by how much of a person shows.
+    /// Recall by the visible fraction of a person.
     #[serde(default)]
     pub visibility: VisibilityTally,
     /// Truths that count, over all frames.
     pub truths: u64,
     /// Reports that count, over all frames.
     pub reports: u64,
-    /// Different people.
+    /// Number of different people.
     pub truth_ids: u64,
-    /// Different tracks.
+    /// Number of different tracks.
     pub track_ids: u64,
 }
 
 impl Tally {
-    /// Counts everything on one sequence.
+    /// Counts everything in one sequence.
     ///
     /// # Errors
     ///
@@ -75,7 +75,7 @@ impl Tally {
         })
     }
 
-    /// The tally of several sequences together, as TrackEval combines them.
+    /// Combines the tallies of several sequences as TrackEval does.
     pub fn combine<'a>(all: impl IntoIterator<Item = &'a Self>) -> Self {
         let all: Vec<&Self> = all.into_iter().collect();
         Self {
@@ -94,7 +94,7 @@ impl Tally {
         }
     }
 
-    /// The figures.
+    /// Returns the figures.
     pub fn scores(&self) -> Scores {
         let mut scores = self.counts();
         self.add_rates(&mut scores);
@@ -171,9 +171,9 @@ impl Tally {
     }
 }
 
-/// All figures of a run under the names that the field uses, as one flat object.
+/// All figures of a run under the names that are usual in the field, as one flat object.
 ///
-/// Rates lie between 0 and 1 (MOTA may be negative). A figure that makes no sense on the input,
+/// Rates lie between 0 and 1 (MOTA may be negative). A figure that has no meaning for the input,
 /// such as an accuracy without people, is absent.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Scores {
@@ -254,16 +254,16 @@ pub struct Scores {
     pub ml: u64,
     /// Fraction of the truths that were matched.
     pub recall: Option<f64>,
-    /// The same of people within 5 m of the camera of whom at least 90 % shows; absent where the
-    /// truth does not say.
+    /// The same for people within 5 m of the camera with at least 90 % visible; absent if the truth
+    /// does not contain this.
     #[serde(default)]
     pub recall_free: Option<f64>,
-    /// The same of those of whom 60 to 90 % shows.
+    /// The same for those with 60 to 90 % visible.
     #[serde(default)]
     pub recall_partly_hidden: Option<f64>,
     /// Fraction of the reports that were matched.
     pub precision: Option<f64>,
-    /// Wrong reports per frame.
+    /// False positives per frame.
     pub fp_per_frame: Option<f64>,
     /// Log-average miss rate, lower is better.
     #[serde(rename = "LAMR")]
@@ -284,36 +284,36 @@ pub struct Scores {
     pub position_error_rms_m: Option<f64>,
     /// Its 95th percentile.
     pub position_error_p95_m: Option<f64>,
-    /// The worst.
+    /// Its maximum.
     pub position_error_max_m: Option<f64>,
     /// Mean time from coming into view to the first match, in seconds.
     pub time_to_confirm_mean_s: Option<f64>,
-    /// People never matched.
+    /// People that were never matched.
     pub never_confirmed: u64,
     /// Mean time from a loss to the next match, in seconds.
     pub time_to_reacquire_mean_s: Option<f64>,
     /// Losses that did not end.
     pub never_reacquired: u64,
-    /// Time that tracks spent on another person than at first, in seconds.
+    /// Time that tracks spent on another person than their first one, in seconds.
     pub wrong_person_s: f64,
-    /// Frames.
+    /// Number of frames.
     pub frames: u64,
     /// Truths that count, over all frames.
     pub truths: u64,
     /// Reports that count, over all frames.
     pub reports: u64,
-    /// Different people.
+    /// Number of different people.
     pub truth_ids: u64,
-    /// Different tracks.
+    /// Number of different tracks.
     pub track_ids: u64,
-    /// Different scores among single reports; 0 without any, or where it was not counted.
+    /// Number of distinct scores among single reports; 0 without any, or if it was not counted.
     #[serde(default)]
     pub distinct_scores: u64,
 }
 
 impl Scores {
-    /// True if all reports have the same score, so that LAMR and AP, which need an order
-    /// of them, say nothing.
+    /// Returns true if all reports have the same score: LAMR and AP then have no meaning, because
+    /// they depend on the order of the scores.
     pub fn has_constant_scores(&self) -> bool {
         self.distinct_scores == 1 && self.reports > 1
     }

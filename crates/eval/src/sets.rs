@@ -7,10 +7,10 @@ use tagalong_math::matching::{Edge, Matcher};
 /// Settings of the distances between sets.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct SetDistance {
-    /// Cost of a person too many or too few, and the greatest distance of a pair: metres on the
+    /// Cost of a missed person or a false report, and the maximum distance of a pair: metres on the
     /// floor, or `1 - IoU` in the image (then at most 1).
     pub cutoff: f64,
-    /// Order of the mean, at least 1; 2 punishes outliers.
+    /// Order of the mean, at least 1; 2 penalises outliers.
     pub order: f64,
 }
 
@@ -21,20 +21,21 @@ impl Default for SetDistance {
 }
 
 impl SetDistance {
-    /// Settings with this cutoff and order.
+    /// Creates settings with this cutoff and order.
     pub fn new(cutoff: f64, order: f64) -> Self {
         Self { cutoff, order }
     }
 
-    /// Both distances of one frame from the distances of the pairs that lie
-    /// below the cutoff (an edge's weight is a distance).
+    /// Computes both distances of one frame from the distances of the pairs that lie below the
+    /// cutoff (the weight of an edge is its distance).
     ///
-    /// One assignment serves both: OSPA (Schuhmacher et al., IEEE TSP 2008,
-    /// equation 3) and GOSPA with alpha = 2 (Rahmathullah et al., FUSION 2017,
-    /// proposition 1) both gain `cutoff^order - distance^order` by a match.
+    /// One assignment serves both: in OSPA (Schuhmacher et al., IEEE TSP 2008, equation 3) and in
+    /// GOSPA with alpha = 2 (Rahmathullah et al., FUSION 2017, proposition 1) a match saves the
+    /// same cost, `cutoff^order - distance^order`.
     pub fn between(&self, truths: usize, reports: usize, near: &[Edge]) -> FrameDistance {
         let pay = self.cutoff.powf(self.order);
-        // The solver maximises; a pair gains whatever it saves against two unmatched ones.
+        // The solver maximises: the weight of a pair is the cost that it saves against two
+        // unmatched ones.
         let mut gains = near.to_vec();
         for edge in &mut gains {
             edge.weight = pay - edge.weight.powf(self.order);
@@ -63,15 +64,15 @@ impl SetDistance {
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[non_exhaustive]
 pub struct FrameDistance {
-    /// Optimal sub-pattern assignment, 0 to the cutoff.
+    /// Optimal sub-pattern assignment distance, 0 to the cutoff.
     pub ospa: f64,
-    /// Generalised OSPA, 0 upwards.
+    /// Generalised OSPA distance, 0 upwards.
     pub gospa: f64,
-    /// Parts of the generalised one.
+    /// Parts of GOSPA.
     pub parts: GospaParts,
 }
 
-/// GOSPA before the root, by cause.
+/// GOSPA before the root is taken, by cause.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct GospaParts {
     /// Distances of the matched pairs.
@@ -98,12 +99,12 @@ pub struct SetTally {
     pub gospa_sum: f64,
     /// Sums of GOSPA's parts.
     pub parts: GospaParts,
-    /// Frames.
+    /// Number of frames.
     pub frames: u64,
 }
 
 impl SetTally {
-    /// Measures each frame of a sequence that `prepared` was made from.
+    /// Measures each frame of the sequence from which `prepared` was made.
     pub fn measure(
         sequence: &Sequence,
         prepared: &Prepared,
@@ -127,7 +128,7 @@ impl SetTally {
         self.frames += 1;
     }
 
-    /// The sums of several sequences together.
+    /// Combines the sums of several sequences.
     pub fn combine<'a>(all: impl IntoIterator<Item = &'a Self>) -> Self {
         all.into_iter().fold(Self::default(), |a, b| Self {
             ospa_sum: a.ospa_sum + b.ospa_sum,
@@ -141,18 +142,18 @@ impl SetTally {
         })
     }
 
-    /// Mean OSPA over the frames; nothing without frames.
+    /// Returns the mean OSPA over the frames; `None` without frames.
     pub fn ospa(&self) -> Option<f64> {
         (self.frames > 0).then(|| self.ospa_sum / self.frames as f64)
     }
 
-    /// Mean GOSPA over the frames; nothing without frames.
+    /// Returns the mean GOSPA over the frames; `None` without frames.
     pub fn gospa(&self) -> Option<f64> {
         (self.frames > 0).then(|| self.gospa_sum / self.frames as f64)
     }
 }
 
-/// The pairs of a frame nearer than the cutoff, weighted by their distance.
+/// Returns the pairs of a frame that are closer than the cutoff, weighted by their distance.
 fn near(of: &Frame, frame: &PreparedFrame, similarity: Similarity, cutoff: f64) -> Vec<Edge> {
     let all: Vec<Edge> = match similarity {
         Similarity::Iou => {
@@ -163,7 +164,8 @@ fn near(of: &Frame, frame: &PreparedFrame, similarity: Similarity, cutoff: f64) 
     all.into_iter().filter(|edge| edge.weight < cutoff).collect()
 }
 
-/// Similarity ends at one metre, but the cutoff may be wider.
+/// Returns the distances of all pairs on the floor. They cannot be computed from the similarity,
+/// which is 0 from one metre on, because the cutoff may be larger.
 fn floor_distances(of: &Frame, frame: &PreparedFrame) -> Vec<Edge> {
     let mut edges = Vec::new();
     for (row, &truth) in frame.truth_at.iter().enumerate() {

@@ -6,17 +6,17 @@ use crate::prepare::Prepared;
 /// Durations, in seconds of the recording.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Times {
-    /// For each person found at all: from the first frame in which they count
-    /// to the first match.
+    /// For each person that was matched at all: from the first frame in which they count to the
+    /// first match.
     pub confirm_s: Vec<f64>,
-    /// People never found.
+    /// People that were never matched.
     pub never_confirmed: u64,
-    /// For each loss that ended: from the first frame without a match (or the
-    /// first frame back in view) to the next match.
+    /// For each loss that ended: time from the first frame without a match (or the first frame back
+    /// in view) to the next match.
     pub reacquire_s: Vec<f64>,
-    /// Losses that did not end.
+    /// Number of losses that did not end.
     pub never_reacquired: u64,
-    /// Time that tracks spent on other people than the one that they were first matched with,
+    /// Time that tracks spent on other people than the first one that they were matched with,
     /// summed over the tracks.
     pub wrong_person_s: f64,
     /// Length of the recording, for rates.
@@ -49,7 +49,7 @@ impl Times {
         times
     }
 
-    /// The times of several sequences together.
+    /// Combines the times of several sequences.
     pub fn combine<'a>(all: impl IntoIterator<Item = &'a Self>) -> Self {
         all.into_iter().fold(Self::default(), |mut sum, one| {
             sum.confirm_s.extend_from_slice(&one.confirm_s);
@@ -67,14 +67,14 @@ impl Times {
 #[derive(Clone, Default)]
 struct Watched {
     confirmed: bool,
-    /// Since when they have been waiting to be found.
+    /// Time since which the person has been waiting for a match.
     waiting_since_ns: Option<i64>,
     last_in_view: Option<usize>,
 }
 
 impl Watched {
     fn look(&mut self, frame: usize, stamp_ns: i64, found: bool, times: &mut Times) {
-        // A person that left the view and came back waits anew.
+        // A person that left the view and came back starts to wait again.
         let stayed = frame > 0 && self.last_in_view == Some(frame - 1);
         self.last_in_view = Some(frame);
         if !self.confirmed {
@@ -100,21 +100,21 @@ impl Watched {
 /// Result of following one person.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Following {
-    /// Time on the right person.
+    /// Time during which the right person was followed.
     pub on_target_s: f64,
-    /// Time on another person.
+    /// Time during which another person was followed.
     pub wrong_person_s: f64,
-    /// Time on something that is no person (or an ignored one).
+    /// Time during which something that is no person (or an ignored one) was followed.
     pub nobody_s: f64,
-    /// Time without following anything.
+    /// Time during which nothing was followed.
     pub idle_s: f64,
-    /// Number of times the target was left after having been followed.
+    /// Number of times that the target was lost after it had been followed.
     pub losses: u64,
 }
 
 impl Following {
-    /// Judges which person a robot followed: `followed` holds for each frame the id of the track
-    /// under the target lock, `target` is the truth's id.
+    /// Scores which person a robot followed: `followed` has for each frame the ID of the track
+    /// under the target lock, `target` is the ID of the right person in the truth.
     pub fn measure(
         prepared: &Prepared,
         matches: &[Vec<Match>],
@@ -151,13 +151,14 @@ impl Following {
     }
 }
 
-/// Returns the duration of each frame: until the next; the last as long as the one before.
+/// Returns the duration of each frame, up to the next one; the last one lasts as long as the one
+/// before it.
 fn frame_lengths_s(prepared: &Prepared) -> Vec<f64> {
     let frames = &prepared.frames;
     let mut lengths: Vec<f64> =
         frames.windows(2).map(|two| seconds(two[1].stamp_ns - two[0].stamp_ns)).collect();
     if !frames.is_empty() {
-        // The last frame has no next one; a single frame lasts no time.
+        // The last frame has no successor; a single frame has no duration.
         lengths.push(lengths.last().copied().unwrap_or(0.0));
     }
     lengths

@@ -1,4 +1,4 @@
-//! Recall by how much of a person the camera sees.
+//! Recall by the visible fraction of a person.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,42 +6,42 @@ use crate::clear::Match;
 use crate::prepare::Prepared;
 use crate::types::{Sequence, Truth};
 
-/// Distance within which people enter these figures, m: farther away depth cameras see little.
+/// Maximum distance of people in these figures, m: farther away, depth cameras see little.
 pub const NEAR_M: f64 = 5.0;
-/// Visible fraction from which a person stands free ...
+/// Visible fraction from which a person counts as fully visible ...
 pub const FREE: f64 = 0.9;
-/// ... and from which more than half of one shows. Fainter ones are in neither figure.
+/// ... and from which one counts as partly hidden. People below this are in neither figure.
 pub const PARTLY: f64 = 0.6;
 
-/// People found, among those that count.
+/// Matched people, among those that count.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Found {
-    /// Matched ...
+    /// Number of matched people ...
     pub matched: u64,
-    /// ... of so many.
+    /// ... out of this number.
     pub of: u64,
 }
 
 impl Found {
-    /// The fraction, if there is anybody to find.
+    /// Returns the fraction that was matched; `None` if there are no people to find.
     pub fn recall(&self) -> Option<f64> {
         (self.of > 0).then(|| self.matched as f64 / self.of as f64)
     }
 }
 
-/// People within [`NEAR_M`] of the camera, over all frames, as far as the truth has their distance
-/// and the fraction of them that shows.
+/// People within [`NEAR_M`] of the camera, over all frames, if the truth has their distance and
+/// visible fraction.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct VisibilityTally {
-    /// At least [`FREE`] of them shows.
+    /// People with a visible fraction of at least [`FREE`].
     pub free: Found,
-    /// At least [`PARTLY`] and less than [`FREE`].
+    /// People with a visible fraction of at least [`PARTLY`] and less than [`FREE`].
     pub partly_hidden: Found,
 }
 
 impl VisibilityTally {
-    /// Counts on one sequence.
+    /// Counts the people of one sequence.
     pub fn measure(sequence: &Sequence, prepared: &Prepared, matches: &[Vec<Match>]) -> Self {
         let mut tally = Self::default();
         for ((of, frame), matches) in sequence.frames.iter().zip(&prepared.frames).zip(matches) {
@@ -64,7 +64,7 @@ impl VisibilityTally {
         found.of += 1;
     }
 
-    /// The tally of several sequences together.
+    /// Combines the tallies of several sequences.
     pub fn combine<'a>(all: impl IntoIterator<Item = &'a Self>) -> Self {
         let mut sum = Self::default();
         for tally in all {

@@ -94,11 +94,11 @@ impl fmt::Display for SafetyDistances {
         write!(
             f,
             "  distances from the edge of the footprint (see docs/safety.md):\n  \
-             at {speed_mps} m/s it stops within {stopping_m:.2} m, and brakes for things from \
-             {before_things_m:.2} m on\n  \
+             at {speed_mps} m/s it stops within {stopping_m:.2} m, and brakes for obstacles nearer \
+             than {before_things_m:.2} m\n  \
              near people it drives at {speed_mps} m/s only while they are {separation_m:.2} m away; it is \
-             slower where they are nearer, and stands below {least_separation_m:.2} m\n  \
-             it stops {followed_m:.2} m before the followed person, and earlier where they come nearer\n  \
+             slower if they are nearer, and stands below {least_separation_m:.2} m\n  \
+             it stops {followed_m:.2} m in front of the followed person, and earlier if they come nearer\n  \
              when it turns, its corners sweep a circle with a radius of {turning_radius_m:.2} m around \
              the middle of the robot\n  \
              after the last image or scan its command holds for {holds_s:.2} s, then zero is commanded, and the robot \

@@ -38,9 +38,10 @@ pub enum Lens {
     /// Perspective, with optional distortion.
     Pinhole(Pinhole),
     /// Unwrapped image of a conical mirror. Its *depth* is the horizontal distance from the axis of
-    /// the mirror, and its columns cover the full circle.
+    /// the mirror, and its columns cover the full circle around the robot.
     Panorama(Panorama),
-    /// No lens: the frames of a laser scan alone carry no images, and no point has a pixel.
+    /// No lens: for frames without images, for example those of a laser scanner only. No point has
+    /// a pixel.
     Blind,
 }
 
@@ -58,8 +59,8 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// Returns a pinhole camera at `height_m` above the floor, above the robot's origin, looking
-    /// forward and `pitch_down_rad` downwards, with its right side raised by `roll_rad`.
+    /// Returns a pinhole camera `height_m` above the robot's origin on the floor. It looks forward
+    /// and `pitch_down_rad` downwards, and its right side is raised by `roll_rad`.
     ///
     /// ```
     /// use nalgebra::{Point2, Point3};
@@ -81,8 +82,8 @@ impl Camera {
         let level = nalgebra::Rotation3::from_matrix_unchecked(Matrix3::new(
             0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0,
         ));
-        // Pitch acts about the horizontal axis of the levelled camera, and roll about the optical
-        // axis after that.
+        // Pitch acts about the horizontal axis of the levelled camera, then roll about the optical
+        // axis.
         let pitch = nalgebra::Rotation3::from_axis_angle(&Vector3::x_axis(), -pitch_down_rad);
         let roll = nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), -roll_rad);
         let rotation = nalgebra::UnitQuaternion::from_rotation_matrix(&(level * pitch * roll));
@@ -111,7 +112,7 @@ impl Camera {
         matches!(self.lens, Lens::Blind)
     }
 
-    /// Returns the pixels per metre at one metre of depth, along columns; of a panorama the pixels
+    /// Returns the pixels per metre at one metre of depth, along columns; for a panorama the pixels
     /// per radian; 0 without an image.
     pub fn focal_px(&self) -> f64 {
         match &self.lens {
@@ -221,8 +222,8 @@ impl Camera {
 
     /// Returns the upper-body square of a person with the head centre `head`: its side is
     /// [`UPPER_BODY_SIDE_M`] at the depth of the face, its upper edge [`HEAD_BELOW_TOP_M`] above
-    /// the head centre, its middle column that of the shoulders. The square is amodal and may
-    /// extend beyond the image; it is empty if the head is behind the camera.
+    /// the head centre, and its middle column is that of the shoulders. The square is amodal and
+    /// may extend beyond the image; it is empty if the head is behind the camera.
     ///
     /// In a panorama it may continue beyond the right edge (see [`Panorama`]).
     pub fn upper_body(&self, head: &Point3<f64>) -> Rect {

@@ -5,9 +5,9 @@ use nalgebra::{Matrix2, Matrix3, Rotation3, Vector2, Vector3};
 /// Largest angle between a ray and the optical axis that [`Distortion::remove`] returns, rad. A ray
 /// at depth 1 cannot lie in the plane of the lens.
 const MAX_ANGLE_RAD: f64 = FRAC_PI_2 - 1e-3;
-/// Steps of an inversion; about four are taken.
+/// Maximum number of steps of an inversion; about four are needed.
 const MAX_STEPS: usize = 40;
-/// Error at which an inversion is good, in focal lengths.
+/// Error below which an inversion has converged, in focal lengths.
 const CLOSE: f64 = 1e-13;
 
 /// Lens distortion, as in `sensor_msgs/CameraInfo`: OpenCV's models.
@@ -18,11 +18,11 @@ pub enum Distortion {
     None,
     /// `plumb_bob`: k1, k2, p1, p2, k3.
     PlumbBob([f64; 5]),
-    /// `rational_polynomial`: k1, k2, p1, p2, k3, k4, k5, k6, and zeros where the calibration has
-    /// no more: the thin prism s1, s2, s3, s4, the tilt of the sensor tx, ty (rad).
+    /// `rational_polynomial`: k1, k2, p1, p2, k3, k4, k5, k6, then the thin prism s1, s2, s3, s4,
+    /// the tilt of the sensor tx, ty (rad); zeros if the calibration has fewer.
     Rational([f64; 14]),
     /// `equidistant`, OpenCV's `fisheye`: k1, k2, k3, k4 of the angle from the axis. Rays at 90
-    /// degrees and more from the axis have no depth along it, and no pixel here.
+    /// degrees or more from the axis have no depth along it, and therefore no pixel here.
     Equidistant([f64; 4]),
 }
 
@@ -51,7 +51,7 @@ impl Distortion {
     }
 
     /// Converts distorted normalised coordinates to ideal ones. Where the model has no inverse, far
-    /// outside of the image, the result is the nearest that is found.
+    /// outside of the image, it returns the nearest point that it finds.
     pub(crate) fn remove(&self, x: f64, y: f64) -> (f64, f64) {
         match self {
             Self::None => (x, y),
@@ -64,8 +64,8 @@ impl Distortion {
         }
     }
 
-    /// Inverts by Newton's method, with shorter steps where a whole one leads away: wide lenses
-    /// bend so much that fixed-point iteration runs off.
+    /// Inverts by Newton's method, with shorter steps where a full one increases the error: wide
+    /// lenses bend so much that fixed-point iteration diverges.
     fn search(&self, goal: Vector2<f64>) -> (f64, f64) {
         let mut at = goal;
         let mut error = goal - self.bent_point(&at);
@@ -86,13 +86,13 @@ impl Distortion {
         (at.x, at.y)
     }
 
-    /// Returns the distorted place of a point.
+    /// Returns the distorted position of a point.
     fn bent_point(&self, at: &Vector2<f64>) -> Vector2<f64> {
         Vector2::from(<[f64; 2]>::from(self.apply(at.x, at.y)))
     }
 }
 
-/// Returns the derivative of a mapping, by differences.
+/// Returns the Jacobian of a mapping by finite differences.
 fn slope(bent: impl Fn(&Vector2<f64>) -> Vector2<f64>, at: &Vector2<f64>) -> Matrix2<f64> {
     let step = 1e-6;
     let columns = [Vector2::x(), Vector2::y()]
@@ -136,7 +136,7 @@ fn equidistant(k: &[f64; 4], angle: f64) -> (f64, f64) {
     (value, slope)
 }
 
-/// Inverts [`equidistant`] within [`MAX_ANGLE_RAD`]: Newton's method between two bounds.
+/// Inverts [`equidistant`] within [`MAX_ANGLE_RAD`] by Newton's method between two bounds.
 fn angle_of(k: &[f64; 4], distorted: f64) -> f64 {
     let mut low = 0.0;
     let mut high = MAX_ANGLE_RAD;

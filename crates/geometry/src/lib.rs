@@ -1,8 +1,8 @@
 //! Cameras with their mounts, the mirror of a panoramic camera, and boxes in images.
 //!
-//! A [`Camera`] translates between the robot frame (X forward, Y left, Z up, m) and pixels,
-//! whatever its [`Lens`]: pinhole with distortion, fisheye, unwrapped panorama, or none at all for a
-//! robot with a laser scanner only.
+//! A [`Camera`] converts between the robot frame (x forward, y left, z up, m) and pixels for any
+//! [`Lens`]: pinhole with distortion, fisheye, unwrapped panorama, or none at all for a robot with
+//! a laser scanner only.
 
 mod camera;
 mod distortion;
@@ -21,8 +21,8 @@ pub use rect::{Extent, ImageBox, Rect};
 
 /// Distance from the visible surface of a head to its centre, in metres.
 ///
-/// Annotated heads carry the surface; states carry the centre, because that point stays the same
-/// when the robot drives around the person.
+/// Annotations give the surface of the head; states give its centre, because that point stays the
+/// same when the robot drives around the person.
 pub const HEAD_RADIUS_M: f64 = 0.08;
 
 /// Side of the upper-body square (head and shoulders) at the person, in metres (the upper-body

@@ -1,24 +1,25 @@
-//! From pixels and depths to positions with covariances: the last step of every detector.
+//! Converts pixels and depths to positions with covariances, which is the last step of every
+//! detector.
 
 use nalgebra::{Matrix3, Point2, Point3};
 
 use crate::{Camera, HALF_HEAD_M, HEAD_RADIUS_M, Lens, Rect, UPPER_BODY_SIDE_M};
 
-/// Height of a person whose feet are not known, m.
+/// Height that is assumed for a person whose feet are not known, m.
 const STANDING_M: f64 = 1.7;
-/// Width of the box of a whole person, m: the median of annotated boxes is 0.37 of the height.
+/// Width of the box of a whole person, m: the median of annotated boxes is 0.37 times the height.
 const WHOLE_BODY_WIDTH_M: f64 = 0.63;
 
-/// Heights above the floor at which the top of a head can be, m: from a child who crouches to a
-/// tall person.
+/// Possible heights of the top of a head above the floor, m: from a crouching child to a tall
+/// person.
 const HEAD_TOPS_M: std::ops::RangeInclusive<f64> = 0.5..=2.2;
 
 /// Position in the robot frame, m, with its covariance, m².
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointEstimate {
-    /// Mean.
+    /// Mean, m.
     pub position: Point3<f64>,
-    /// Covariance.
+    /// Covariance, m².
     pub covariance: Matrix3<f64>,
 }
 
@@ -32,20 +33,21 @@ pub struct FaceDepth {
 }
 
 impl FaceDepth {
-    /// Returns the depth at which a part of a person that is `size_m` wide appears `size_px` wide,
-    /// with a standard deviation that is this fraction of it: people differ in size.
+    /// Returns the depth at which a part of a person that is `size_m` wide appears `size_px` wide.
+    /// `sigma_fraction` is its standard deviation as a fraction of the depth, because people differ
+    /// in size.
     pub fn by_size(camera: &Camera, size_m: f64, size_px: f64, sigma_fraction: f64) -> Self {
         let depth_m = camera.focal_px() * size_m / size_px;
         Self { depth_m, sigma_m: depth_m * sigma_fraction }
     }
 
-    /// Returns the measured depth with this standard deviation, m, or itself without a measurement.
+    /// Returns the measured depth with this standard deviation, m, or `self` without a measurement.
     #[must_use]
     pub fn or_measured(self, measured_m: Option<f64>, sigma_m: f64) -> Self {
         measured_m.map_or(self, |depth_m| Self { depth_m, sigma_m })
     }
 
-    /// Returns the depth of the centre of the head, m: the surface lies before it.
+    /// Returns the depth of the centre of the head, m, which lies behind the surface.
     pub fn head_m(&self) -> f64 {
         self.depth_m + HEAD_RADIUS_M
     }
@@ -67,7 +69,7 @@ impl Camera {
         }
     }
 
-    /// Returns the centre of the head of the person in an upper-body square, as
+    /// Returns the centre of the head of the person in an upper-body square, computed as by
     /// [`Camera::head_of`], with the covariance at the centre of the square.
     ///
     /// ```
@@ -91,9 +93,9 @@ impl Camera {
     }
 
     /// Returns the centre of the head, in the robot frame, of the person in a box around the whole
-    /// body: its lower border is where the feet touch the floor, its upper border the top of the
-    /// head, at whatever height. `None` if the box reaches the lower border of the image, where the
-    /// feet may be cut off, if no person is as tall as that, and for other lenses than perspective.
+    /// body: its lower edge is where the feet touch the floor, its upper edge the top of the head
+    /// at any height. `None` if the box reaches the lower edge of the image, where the feet may be
+    /// cut off, if no person is that tall, and for lenses that are not perspective.
     ///
     /// ```
     /// use tagalong_geometry::{Camera, Distortion, Pinhole, Rect};
@@ -116,15 +118,16 @@ impl Camera {
         let to_feet = rotation * self.ray(Point2::new(column, lowest));
         let to_top = rotation * self.ray(Point2::new(column, whole_body.y));
         let away_m = (to_feet.z < 0.0).then(|| eye.z / -to_feet.z * to_feet.xy().norm())?;
-        // The head is above the feet, so its ray is followed as far along the floor.
+        // The head is above the feet, so its ray is followed to the horizontal distance of the
+        // feet.
         let top = eye + to_top * (away_m / to_top.xy().norm());
         HEAD_TOPS_M.contains(&top.z).then(|| Point3::new(top.x, top.y, top.z - HALF_HEAD_M))
     }
 
     /// Returns the box of the whole person with this tracked box and this head centre in the robot
-    /// frame, m: from the top of the head to the floor below it. A tracked box that is no square is
-    /// that of a whole person already. Where the floor is not known (the head is at a height at
-    /// which no head is, or the lens is not perspective), the person is taken to stand.
+    /// frame, m: from the top of the head to the floor below it. A tracked box that is not square
+    /// already encloses the whole person. If the position of the floor is unclear (no head can be
+    /// at this height, or the lens is not perspective), the person is assumed to stand.
     ///
     /// ```
     /// use nalgebra::Point3;
@@ -149,7 +152,8 @@ impl Camera {
             matches!(self.lens, Lens::Pinhole(_)) && HEAD_TOPS_M.contains(&(head.z + HALF_HEAD_M));
         let feet = self.project(&Point3::new(head.x, head.y, 0.0)).filter(|_| is_known);
         let (middle, bottom) = match feet {
-            // The body is between the shoulders and the feet, which a camera that rolls shows aside.
+            // The body lies between the shoulders and the feet, which are not in the same column if
+            // the camera rolls.
             Some(feet) if feet.y > standing.y => (0.5 * (tracked.centre().x + feet.x), feet.y),
             _ => (tracked.centre().x, standing.bottom()),
         };

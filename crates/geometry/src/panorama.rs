@@ -6,15 +6,15 @@ use crate::{HEAD_BELOW_TOP_M, HEAD_RADIUS_M, Rect, UPPER_BODY_SIDE_M};
 
 /// A camera that looks up into a conical mirror.
 ///
-/// The **camera frame** is that of any camera, with z along the common axis: the pinhole is its
-/// origin, the image's top is -y. The robot mounts it [`upright`](Self::upright): z up, the image's
-/// top towards the front, the image's right towards the left, since it shows the ceiling from
-/// below.
+/// The **camera frame** is defined as for any camera, with z along the common axis, the pinhole as
+/// its origin and -y towards the top of the image. The camera is mounted
+/// [`upright`](Self::upright): z points up, the top of the image to the front, and its right side
+/// to the left, because it looks at the ceiling from below.
 ///
 /// The cone stands above the pinhole with its apex down. In the half plane of one bearing the
-/// mirror is a straight line, so all rays leave as if from the mirror image of the pinhole; over
-/// all bearings these images form a ring beyond the axis. There is no single viewpoint. A ray at
-/// the angle `phi` from the axis leaves at the elevation `phi + 90 deg - 2 * half_angle`.
+/// mirror is a straight line, so all rays appear to start from the mirror image of the pinhole;
+/// over all bearings these mirror images form a ring beyond the axis. There is no single viewpoint.
+/// A ray at the angle `phi` from the axis leaves at the elevation `phi + 90 deg - 2 * half_angle`.
 ///
 /// ```
 /// use tagalong_geometry::ConicalMirror;
@@ -51,7 +51,7 @@ impl ConicalMirror {
         mirror.is_sane().then_some(mirror)
     }
 
-    /// Returns true if all numbers are finite and every ray between the two circles meets the
+    /// Returns true if all numbers are finite, and if every ray between the two circles meets the
     /// mirror.
     pub fn is_sane(&self) -> bool {
         self.centre_px.iter().all(|v| v.is_finite())
@@ -67,8 +67,8 @@ impl ConicalMirror {
             && (self.outer_px / self.focal_px).atan() < self.half_angle_rad
     }
 
-    /// Returns the pose of a camera in the middle of the robot that looks up from `height_m` above
-    /// the floor, with the image's top to the front.
+    /// Returns the pose of a camera in the middle of the robot, `height_m` above the floor, that
+    /// looks up with the top of the image to the front.
     pub fn upright(height_m: f64) -> Isometry3<f64> {
         let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), FRAC_PI_2);
         let turn = UnitQuaternion::from_rotation_matrix(&turn);
@@ -87,14 +87,14 @@ impl ConicalMirror {
         (radius_px / self.focal_px).atan() + FRAC_PI_2 - 2.0 * self.half_angle_rad
     }
 
-    /// Returns the radius of the circle of an elevation, pixels: the inverse of
+    /// Returns the radius of the circle of this elevation, pixels: the inverse of
     /// [`elevation`](Self::elevation).
     pub fn radius_px(&self, elevation_rad: f64) -> f64 {
         self.focal_px * (elevation_rad - FRAC_PI_2 + 2.0 * self.half_angle_rad).tan()
     }
 
-    /// Returns bearing (positive to the left of the image's top) and elevation of a point in the
-    /// camera frame, rad.
+    /// Returns the bearing (positive to the left of the image's top) and the elevation of a point
+    /// in the camera frame, rad.
     pub fn direction(&self, point_in_camera: &Point3<f64>) -> (f64, f64) {
         let (ring, height) = self.ring_m();
         let p = point_in_camera;
@@ -102,14 +102,14 @@ impl ConicalMirror {
         (bearing, (p.z - height).atan2(p.xy().coords.norm() + ring))
     }
 
-    /// Returns the pixel of the raw image in a direction.
+    /// Returns the pixel of the raw image in this direction.
     pub fn raw_pixel(&self, bearing_rad: f64, elevation_rad: f64) -> Point2<f64> {
         let (sine, cosine) = bearing_rad.sin_cos();
         let radius = self.radius_px(elevation_rad);
         Point2::new(self.centre_px.x + radius * sine, self.centre_px.y - radius * cosine)
     }
 
-    /// Returns the viewpoint on the ring and the unit vector of a direction, in the camera frame.
+    /// Returns the viewpoint on the ring and the unit vector of a viewing ray, in the camera frame.
     pub fn ray(&self, bearing_rad: f64, elevation_rad: f64) -> (Point3<f64>, Vector3<f64>) {
         let (ring, height) = self.ring_m();
         let outward = Vector3::new(bearing_rad.sin(), -bearing_rad.cos(), 0.0);
@@ -118,7 +118,7 @@ impl ConicalMirror {
         (from, along * outward + Vector3::new(0.0, 0.0, up))
     }
 
-    /// Returns the distance from the axis at which a ray of an elevation meets the floor, for a
+    /// Returns the distance from the axis at which a ray of this elevation meets the floor, for a
     /// camera `camera_height_m` above it; `None` at and above the horizon.
     pub fn floor_range_m(&self, elevation_rad: f64, camera_height_m: f64) -> Option<f64> {
         let (ring, height) = self.ring_m();
@@ -126,15 +126,15 @@ impl ConicalMirror {
     }
 }
 
-/// Unwrapped image of a [`ConicalMirror`]: a column per bearing, a row per elevation, both evenly
-/// spaced.
+/// Unwrapped image of a [`ConicalMirror`]: one column per bearing and one row per elevation, both
+/// evenly spaced.
 ///
 /// The middle column is the front of the robot, columns left of it show the robot's left side, and
 /// the seam is behind. Pixel (0, 0) is the **centre** of the upper left pixel.
 ///
 /// **Across the seam.** Columns are counted modulo [`columns`](Self::columns). A region starts at a
-/// column from 0 up to that and keeps its width: across the seam it continues beyond the right
-/// edge, and is never cut there.
+/// column from 0 up to that number and keeps its width: across the seam it continues beyond the
+/// right edge, and is never cut there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Panorama {
     /// The mirror.
@@ -146,7 +146,7 @@ pub struct Panorama {
 }
 
 impl Panorama {
-    /// Returns highest and lowest elevation at the edges of the image, rad.
+    /// Returns the highest and the lowest elevation, at the edges of the image, rad.
     pub fn elevations(&self) -> [f64; 2] {
         [self.mirror.outer_px, self.mirror.inner_px].map(|radius| self.mirror.elevation(radius))
     }
@@ -180,7 +180,7 @@ impl Panorama {
         Point2::new(self.column(bearing), self.row(elevation))
     }
 
-    /// Returns the raw pixel of a pixel of the unwrapped image.
+    /// Returns the pixel of the raw image for a pixel of the unwrapped image.
     pub fn raw_pixel(&self, column: f64, row: f64) -> Point2<f64> {
         self.mirror.raw_pixel(self.bearing(column), self.elevation(row))
     }
@@ -206,9 +206,9 @@ impl Panorama {
     }
 
     /// Returns the upper body of a person with the head centre `head` in the camera frame, defined
-    /// as by [`Camera::upper_body`](crate::Camera::upper_body): [`UPPER_BODY_SIDE_M`] wide and high
-    /// at the distance of the face. It is cut neither at the seam nor at the upper and lower edge,
-    /// and empty if the head touches the axis.
+    /// as in [`Camera::upper_body`](crate::Camera::upper_body): [`UPPER_BODY_SIDE_M`] wide and high
+    /// at the distance of the face. It is not cut at the seam or at the upper and lower edges, and
+    /// it is empty if the head touches the axis.
     pub fn upper_body(&self, head: &Point3<f64>) -> Rect {
         let range = head.xy().coords.norm() - HEAD_RADIUS_M;
         if range <= 0.05 {

@@ -3,11 +3,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::{HALF_HEAD_M, HEAD_BELOW_TOP_M, UPPER_BODY_SIDE_M};
 
-/// Height of a box, in its widths, from which it is that of a whole person.
+/// Ratio of height to width from which a box is that of a whole person.
 const WHOLE_ASPECT: f64 = 1.5;
 
-/// An upright rectangle in an image, in pixels. `x`, `y` is the upper left
-/// corner; it may lie outside the image.
+/// An upright rectangle in an image, in pixels. `x`, `y` is the upper left corner, which may lie
+/// outside the image.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Rect {
     /// Left edge.
@@ -51,7 +51,7 @@ impl Rect {
         self.x <= point.x && point.x < self.right() && self.y <= point.y && point.y < self.bottom()
     }
 
-    /// Returns the common part; of zero size if there is none.
+    /// Returns the intersection; its size is zero if there is none.
     pub fn intersection(&self, other: &Self) -> Self {
         let x = self.x.max(other.x);
         let y = self.y.max(other.y);
@@ -70,7 +70,7 @@ impl Rect {
     /// ```
     pub fn iou(&self, other: &Self) -> f64 {
         let common = self.intersection(other).area();
-        // As of most pairs, and sooner than the sum.
+        // Most pairs do not overlap, and this test is cheaper than the sum.
         if common == 0.0 {
             return 0.0;
         }
@@ -83,16 +83,15 @@ impl Rect {
         self.intersection(&Self::new(0.0, 0.0, width as f64, height as f64))
     }
 
-    /// Returns the rectangle grown by the fraction `by` of each side, about the same centre.
+    /// Returns the rectangle with each side longer by the fraction `by`, about the same centre.
     pub fn inflated(&self, by: f64) -> Self {
         let dx = self.width * by;
         let dy = self.height * by;
         Self::new(self.x - 0.5 * dx, self.y - 0.5 * dy, self.width + dx, self.height + dy)
     }
 
-    /// Returns the upper-body square of a standing person of the given height, in metres, if this
-    /// rectangle encloses the whole body: for boxes of detectors and data sets that annotate whole
-    /// bodies only.
+    /// Returns the upper-body square of a standing person of the given height, m, if this rectangle
+    /// encloses the whole body: for detectors and data sets that have boxes of whole bodies only.
     pub fn upper_body_of_standing(&self, height_m: f64) -> Self {
         let px_per_m = self.height / height_m;
         let side = UPPER_BODY_SIDE_M * px_per_m;
@@ -100,8 +99,9 @@ impl Rect {
         Self::new(self.centre().x - 0.5 * side, self.y - above, side, side)
     }
 
-    /// Returns the box of a whole standing person of the given height, in metres, if this rectangle
-    /// is the upper-body square: half as wide as high, as the images that people are recognised in.
+    /// Returns the box of a whole standing person of the given height, m, if this rectangle is the
+    /// upper-body square. The box is half as wide as high, like the images on which people are
+    /// recognised.
     pub fn standing_of_upper_body(&self, height_m: f64) -> Self {
         let px_per_m = self.height / UPPER_BODY_SIDE_M;
         let above = (HEAD_BELOW_TOP_M - HALF_HEAD_M) * px_per_m;
@@ -109,7 +109,8 @@ impl Rect {
         Self::new(self.centre().x - 0.25 * height, self.y + above, 0.5 * height, height)
     }
 
-    /// Returns true for the box of a whole person, by its shape: that of an upper body is a square.
+    /// Returns true if the shape is that of the box of a whole person; that of an upper body is a
+    /// square.
     pub fn is_whole_body(&self) -> bool {
         self.height > WHOLE_ASPECT * self.width
     }

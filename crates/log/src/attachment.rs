@@ -9,14 +9,14 @@ use mcap::records::{Record, op};
 use crate::log_files::open_file;
 use crate::{Limits, LogError};
 
-/// Length of the bytes that an MCAP file begins with.
+/// Length of the magic bytes at the start of an MCAP file.
 const MAGIC_BYTES: usize = 8;
 
-/// Attachment of a log that `tagalong alter` made of another one: the SHA-256 of the recording that all
-/// copies go back to.
+/// Attachment of a log that `tagalong alter` made from another one: the SHA-256 of the recording
+/// from which all copies originate.
 pub const COPY_OF: &str = "copy-of.sha256";
 
-/// Returns the attachment of a name that stands before the first message of a file; `None` if
+/// Returns the attachment with this name, if it precedes the first message of a file; `None` if
 /// there is none, or if the file is damaged before it.
 ///
 /// # Errors
@@ -43,7 +43,7 @@ pub fn read_attachment(
     Ok(None)
 }
 
-/// Returns the next header or attachment with its bytes; `None` at anything else.
+/// Returns the next header or attachment with its bytes; `None` for any other record.
 fn next_record(file: &mut BufReader<File>, limits: &Limits) -> Option<(u8, Vec<u8>)> {
     let mut head = [0; 9];
     file.read_exact(&mut head).ok()?;
@@ -53,7 +53,7 @@ fn next_record(file: &mut BufReader<File>, limits: &Limits) -> Option<(u8, Vec<u
         return None;
     }
     let mut body = Vec::new();
-    // Read up to the length, and not allocated by it: it may be a lie.
+    // The buffer grows with the data and is not allocated by the stated length, which may be wrong.
     let read = file.take(length).read_to_end(&mut body).ok()?;
     (read as u64 == length).then_some((opcode, body))
 }

@@ -1,10 +1,10 @@
-//! Lens of a camera from `sensor_msgs/CameraInfo`.
+//! Conversion of `sensor_msgs/CameraInfo` to the lens of a camera.
 
 use tagalong_geometry::{ConicalMirror, Distortion, Panorama, Pinhole};
 
 use crate::msgs::{CameraInfo, Header};
 
-/// Lens with the size of its image.
+/// Lens and the size of its image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Intrinsics {
@@ -14,15 +14,15 @@ pub struct Intrinsics {
     pub width: usize,
     /// Rows of the image as delivered; 0 if the message does not give them.
     pub height: usize,
-    /// Distance to the left camera of a stereo pair, m, from `P[3]`; `None` if 0.
+    /// Baseline: distance to the left camera of a stereo pair, m, from `P[3]`; `None` if 0.
     pub baseline_m: Option<f64>,
     /// Mirror in front of the lens, if there is one.
     pub mirror: Option<Mirrored>,
 }
 
 impl Intrinsics {
-    /// Returns the lens for images that are smaller or larger by a whole number in both directions;
-    /// `None` for other sizes, equal ones included.
+    /// Returns the lens for images that are smaller or larger by an integer factor in both
+    /// directions; `None` for other sizes, including equal ones.
     pub fn scaled_to(&self, width: usize, height: usize) -> Option<Self> {
         let is_known = self.width > 0 && self.height > 0 && width > 0 && height > 0;
         if !is_known || self.mirror.is_some() || (width, height) == (self.width, self.height) {
@@ -35,7 +35,7 @@ impl Intrinsics {
         }
         let scale = width as f64 / self.width as f64;
         let Pinhole { fx, fy, cx, cy, distortion } = self.lens;
-        // Pixel centres have whole coordinates, hence the half pixels.
+        // Pixel centres have integer coordinates, hence the half pixels.
         let [cx, cy] = [cx, cy].map(|c| (c + 0.5) * scale - 0.5);
         let lens = Pinhole { fx: fx * scale, fy: fy * scale, cx, cy, distortion };
         Some(Self { lens, width, height, ..*self })
@@ -48,8 +48,8 @@ impl Intrinsics {
 pub enum Mirrored {
     /// Circular image: `distortion_model` is [`CONICAL_MIRROR`].
     Raw(ConicalMirror),
-    /// Unwrapped image: `distortion_model` is [`UNWRAPPED`], and D is that of the mirror with both
-    /// radii in focal lengths.
+    /// Unwrapped image: `distortion_model` is [`UNWRAPPED`], and D is that of the mirror, with both
+    /// radii divided by the focal length.
     Unwrapped(Panorama),
 }
 
@@ -71,14 +71,14 @@ pub const UNWRAPPED: &str = "conical_mirror_unwrapped";
 
 impl CameraInfo {
     /// Returns the calibration of a camera without mirror as its driver would publish it;
-    /// [`intrinsics`] reads it back. `size` is columns and rows of the image, and `aside_m` the
-    /// distance to the right of the left camera of a stereo pair, m.
+    /// [`intrinsics`] reads it back. `size` is the number of columns and rows of the image, and
+    /// `aside_m` the distance to the right of the left camera of a stereo pair, m.
     pub fn of_lens(header: &Header, lens: &Pinhole, size: (usize, usize), aside_m: f64) -> Self {
         let Pinhole { fx, fy, cx, cy, distortion } = *lens;
         let (model, d) = match distortion {
             Distortion::None => ("plumb_bob", vec![0.0; 5]),
             Distortion::PlumbBob(d) => ("plumb_bob", d.to_vec()),
-            // Drivers write 8 coefficients where the others are zero.
+            // Drivers write only 8 coefficients if the others are zero.
             Distortion::Rational(d) if d[8..] == [0.0; 6] => {
                 ("rational_polynomial", d[..8].to_vec())
             }
@@ -99,7 +99,7 @@ impl CameraInfo {
     }
 }
 
-/// Reason for which a calibration cannot be used; the field is named.
+/// Reason why a calibration cannot be used, with the name of the field.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CalibrationError {
@@ -148,12 +148,12 @@ pub enum CalibrationError {
     },
 }
 
-/// Reads a calibration. `rectified` states that the image was rectified already: then P holds for
-/// it, and it has no distortion.
+/// Reads a calibration. If `rectified`, the image was rectified before it was recorded: then P
+/// applies, and there is no distortion.
 ///
-/// ROI and binning: K and P are given in pixels of the full image. A pixel of
-/// the delivered image covers `binning` of them, and pixel coordinates are those
-/// of pixel centres, hence `c' = (c - offset + 0.5) / binning - 0.5`.
+/// ROI and binning: K and P are given in pixels of the full image. A pixel of the delivered image
+/// covers `binning` of them, and pixel coordinates refer to pixel centres, hence
+/// `c' = (c - offset + 0.5) / binning - 0.5`.
 ///
 /// # Errors
 /// [`CalibrationError`]; every number is checked before it is used.
@@ -162,7 +162,7 @@ pub fn intrinsics(info: &CameraInfo, rectified: bool) -> Result<Intrinsics, Cali
     check_rotation(&info.r)?;
     let k = &info.k;
     let p = &info.p;
-    // P holds for rectified images; where K is left out, or has ones on its diagonal alone, it is all
+    // P is for rectified images, but if K is missing, or only has ones on its diagonal, P is all
     // there is.
     let has_no_k = k[0] == 0.0 && k[4] == 0.0;
     let rectified = rectified || has_no_k && p[0] != 0.0;
@@ -226,8 +226,8 @@ pub fn check_size(
     })
 }
 
-/// Returns true for a calibration without focal lengths, neither in K nor in P, which by REP 104 means
-/// uncalibrated. Drivers may fill other places of it: ones on the diagonal.
+/// Returns true for a calibration without focal lengths in K and P, which by REP 104 means that the
+/// camera is uncalibrated. Drivers may fill other elements, such as ones on the diagonal.
 pub(crate) fn is_blank(info: &CameraInfo) -> bool {
     let has_k = info.k[0] != 0.0 && info.k[4] != 0.0;
     let has_p = info.p[0] != 0.0 && info.p[5] != 0.0;
@@ -244,7 +244,7 @@ fn check_finite(info: &CameraInfo) -> Result<(), CalibrationError> {
     Ok(())
 }
 
-/// Checks that R is a rotation, or all zero where the driver leaves it out.
+/// Checks that R is a rotation, or all zero if the driver leaves it out.
 fn check_rotation(r: &[f64; 9]) -> Result<(), CalibrationError> {
     if r.iter().all(|v| *v == 0.0) {
         return Ok(());
@@ -258,7 +258,7 @@ fn check_rotation(r: &[f64; 9]) -> Result<(), CalibrationError> {
     Ok(())
 }
 
-/// Largest focal length, in sides of the image.
+/// Maximum focal length, as a multiple of the image side.
 const LONGEST_FOCAL: f64 = 1e3;
 
 fn check_lens(
@@ -271,7 +271,8 @@ fn check_lens(
             return Err(CalibrationError::Field { field, value, why: "must be positive" });
         }
     }
-    // Of a telescope with a view of a twentieth of a degree; a larger number has another unit.
+    // That of a telescope with a view of a twentieth of a degree; a larger value must be in another
+    // unit.
     let longest = LONGEST_FOCAL * f64::from(info.width.max(info.height));
     for (field, value) in [(names[0], fx), (names[1], fy)] {
         if longest > 0.0 && value > longest {
@@ -279,7 +280,7 @@ fn check_lens(
             return Err(CalibrationError::Field { field, value, why });
         }
     }
-    // The outer borders of the pixels: half a pixel beyond the first and the last centre.
+    // The outer edges of the pixels are half a pixel beyond the first and the last centre.
     for (field, value, size) in [(names[2], cx, info.width), (names[3], cy, info.height)] {
         if size > 0 && !(-0.5..=f64::from(size) - 0.5).contains(&value) {
             return Err(CalibrationError::Field { field, value, why: "must lie in the image" });
@@ -290,7 +291,7 @@ fn check_lens(
 
 fn distortion(info: &CameraInfo) -> Result<Distortion, CalibrationError> {
     let d = &info.d;
-    // All-zero coefficients are no distortion under any model, even an unknown one.
+    // All-zero coefficients mean no distortion in any model, even an unknown one.
     if d.iter().all(|v| *v == 0.0) {
         return Ok(Distortion::None);
     }
@@ -302,7 +303,7 @@ fn distortion(info: &CameraInfo) -> Result<Distortion, CalibrationError> {
             all[..count].copy_from_slice(d);
             Ok(Distortion::Rational(all))
         }
-        // OpenCV's name, and that of ROS.
+        // The names in ROS and in OpenCV.
         ("equidistant" | "fisheye", 4) => Ok(Distortion::Equidistant([d[0], d[1], d[2], d[3]])),
         (model, count) => Err(CalibrationError::Distortion { model: model.to_owned(), count }),
     }
@@ -313,7 +314,7 @@ fn baseline(p: &[f64; 12]) -> Option<f64> {
     (p[0] > 0.0 && p[3] != 0.0).then(|| -p[3] / p[0])
 }
 
-/// Returns true if a size is a whole number of times another, and larger, in both directions.
+/// Returns true if a size is an integer multiple of another, and larger, in both directions.
 fn is_multiple(large: (usize, usize), small: (usize, usize)) -> bool {
     let times = large.0 / small.0;
     times > 1 && (times * small.0, times * small.1) == large

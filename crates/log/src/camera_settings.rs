@@ -6,11 +6,11 @@ use serde::de::value::MapAccessDeserializer;
 use serde::de::{Error, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// `camera` under `[input]`: the name of one, or a table with its pose.
+/// `camera` under `[input]`: the name of a camera, or a table with its pose.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum CameraSettings {
-    /// Folder that the topics of the camera share.
+    /// Prefix that the topics of the camera share.
     Named(String),
     /// Pose of the camera on the robot.
     Mounted(MountSettings),
@@ -25,7 +25,7 @@ impl Serialize for CameraSettings {
     }
 }
 
-/// Reader of either form, which keeps the messages about mistakes in the table.
+/// Visitor for either form, which keeps the messages about errors in the table.
 struct EitherForm;
 
 impl<'de> Visitor<'de> for EitherForm {
@@ -66,11 +66,11 @@ impl JsonSchema for CameraSettings {
     }
 }
 
-/// Pose of the camera: above the robot's origin, looking forward.
+/// Pose of a camera above the robot's origin that looks forward.
 #[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MountSettings {
-    /// Camera whose images are used, of several: the folder that its topics share.
+    /// Camera whose images are used, if there are several: the prefix that its topics share.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
     /// Height above the floor, m.
@@ -79,13 +79,13 @@ pub struct MountSettings {
     /// Angle of the optical axis below the horizon, degrees.
     #[schemars(range(min = -180.0, max = 180.0))]
     pub pitch_down_deg: f64,
-    /// Roll, degrees; positive if its right side is raised.
+    /// Roll, degrees; positive if the camera's right side is raised.
     #[schemars(range(min = -180.0, max = 180.0))]
     pub roll_deg: f64,
 }
 
 impl MountSettings {
-    /// Returns the pose as that of the camera of this name.
+    /// Returns the pose as that of the camera with this name.
     pub fn with_name(self, name: &str) -> Self {
         Self { name: Some(name.to_owned()), ..self }
     }

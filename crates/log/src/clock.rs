@@ -1,13 +1,14 @@
-//! Times of the messages of one source: their stamps, and the times at which they were recorded.
+//! Times of the messages from one source: their stamps, and the times at which they were recorded.
 
 use tagalong_core::Stamp;
 use tagalong_math::{median, percentile};
 
-/// Time over which messages of one stamp are recorded beyond which the stamp is not that of each, s.
+/// Duration over which messages with the same stamp are recorded beyond which the stamp cannot be
+/// right for each of them, s.
 const COARSE_S: f64 = 0.3;
-/// Number of messages below which a lag is not measured.
+/// Minimum number of messages for measuring a lag.
 const LEAST_MESSAGES: usize = 5;
-/// Largest spread of a constant lag, s: from the tenth to the ninetieth percentile.
+/// Maximum spread of a constant lag, s, between the tenth and the ninetieth percentile.
 const CONSTANT_S: f64 = 0.2;
 /// Time by which stamps are later than their recording beyond which their clock is not that of the
 /// recording, s.
@@ -18,30 +19,30 @@ pub(crate) const DELAY_S: f64 = 1.0;
 /// Nanoseconds of a second.
 const SECOND_NS: u64 = 1_000_000_000;
 
-/// Ranges of the stamps and of the times of recording of a topic, or of one transform.
+/// Ranges of the stamps and of the recording times of a topic, or of one transform.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Times {
     /// Earliest and latest stamp.
     pub(crate) first: Stamp,
     pub(crate) last: Stamp,
-    /// Earliest and latest time of recording.
+    /// Earliest and latest recording time.
     pub(crate) first_recorded: Stamp,
     pub(crate) last_recorded: Stamp,
-    /// Number of runs of messages with one stamp.
+    /// Number of runs of messages with the same stamp.
     runs: u64,
-    /// Number of them that were recorded over more than [`COARSE_S`].
+    /// Number of those that were recorded over more than [`COARSE_S`].
     coarse_runs: u64,
     /// True if all stamps are whole seconds.
     is_whole: bool,
-    /// Stamp of the last run, and the time of recording of its first message.
+    /// Stamp of the last run, and the recording time of its first message.
     run: (Stamp, Stamp),
     is_run_coarse: bool,
-    /// Time by which the stamp of the message with the least delay is later than its recording, s.
+    /// Difference of stamp minus recording time of the message with the least delay, s.
     latest_lag_s: f64,
 }
 
 impl Times {
-    /// Starts with one message.
+    /// Creates the times of one message.
     pub(crate) fn new(stamp: Stamp, recorded: Stamp) -> Self {
         Self {
             first: stamp,
@@ -57,7 +58,7 @@ impl Times {
         }
     }
 
-    /// Returns the times of messages in the order of recording; `None` without any.
+    /// Returns the times of messages in the order of recording; `None` without messages.
     pub(crate) fn of(stamps: &[Stamp], recorded: &[Stamp]) -> Option<Self> {
         let mut times: Option<Self> = None;
         for (stamp, recorded) in stamps.iter().zip(recorded) {
@@ -88,31 +89,32 @@ impl Times {
         }
     }
 
-    /// Returns the times with those of recording in place of the stamps.
+    /// Returns the times with the recording times in place of the stamps.
     pub(crate) fn as_recorded(&self) -> Self {
         let mut times = Self::new(self.first_recorded, self.first_recorded);
         times.add(self.last_recorded, self.last_recorded);
         times
     }
 
-    /// Returns the time by which no stamp is later than its recording, s; `None` for a few messages only.
+    /// Returns the largest difference of stamp minus recording time, s; `None` if there are few
+    /// messages.
     pub(crate) fn latest_lag_s(&self) -> Option<f64> {
         (self.runs >= LEAST_MESSAGES as u64).then_some(self.latest_lag_s)
     }
 
-    /// Returns true if one stamp stands for messages of many times, most of the time.
+    /// Returns true if most stamps are shared by messages of many times.
     pub(crate) fn are_coarse(&self) -> bool {
         2 * self.coarse_runs > self.runs
     }
 
-    /// Returns true if the stamps are whole seconds, and stand for messages of many times.
+    /// Returns true if the stamps are whole seconds, shared by messages of many times.
     pub(crate) fn are_whole_seconds(&self) -> bool {
         self.is_whole && self.are_coarse()
     }
 }
 
-/// Returns the time by which the stamps of messages are later than their recording, s, which is
-/// negative by the time that they take; `None` if it varies, or is that of a few messages only.
+/// Returns the difference of stamp minus recording time, s, which is negative by the delay of the
+/// messages; `None` if it varies, or if there are few messages.
 pub(crate) fn constant_lag_s(stamps: &[Stamp], recorded: &[Stamp]) -> Option<f64> {
     let both = stamps.iter().zip(recorded);
     let lags_s: Vec<f64> = both.map(|(stamp, recorded)| stamp.seconds_since(*recorded)).collect();

@@ -1,8 +1,9 @@
 //! Reader of a rosbag2 database (`.db3`). See [`crate::LogWalker`] for the rules.
 //!
-//! Messages come in the order in which they were stored, one query each. Nothing but the two tables
-//! that a recorder writes is read: a view or a virtual table of their names would run what the file
-//! says. Definitions of messages are not needed, so bags without them are read as others are.
+//! Messages are read in the order in which they were stored, with one query each. Nothing but the
+//! two tables that a recorder writes is read, because a view or a virtual table of the same name
+//! would execute the contents of the file. Message definitions are not needed, so bags without them
+//! are read like others.
 //!
 //! Source: `rosbag2_storage_sqlite3`, schema versions 1 to 4.
 
@@ -22,7 +23,7 @@ use crate::walk::{Channel, Located, Walk};
 /// First bytes of a database.
 pub(crate) const MAGIC: &[u8] = b"SQLite format 3\0";
 
-/// Length of the data is asked first, so that a huge message is never in memory.
+/// The length of the data is queried first, so that a huge message is never in memory.
 const NEXT: &str = "SELECT id, topic_id, timestamp, length(data), \
     CASE WHEN length(data) <= ?2 THEN data END \
     FROM messages WHERE id > ?1 ORDER BY id LIMIT 1";
@@ -30,12 +31,12 @@ const TOPICS: &str = "SELECT id, name, type, serialization_format FROM topics OR
 const TABLES: &str = "SELECT count(*) FROM sqlite_master WHERE type = 'table' \
     AND name IN ('topics', 'messages') AND sql LIKE 'CREATE TABLE%'";
 
-/// Memory of the reader of a database.
+/// State of the reader of a database.
 pub(crate) struct Database {
     opened: Opened,
-    /// Id of the last message.
+    /// ID of the last message that was read.
     last: i64,
-    /// Id of the last message of the file.
+    /// ID of the last message in the file.
     end: i64,
     /// Size of the file, bytes ...
     bytes: u64,
@@ -48,7 +49,7 @@ struct Stored {
     topic: i64,
     time_ns: i64,
     length: u64,
-    /// `None` if it is longer than the limit.
+    /// `None` if the data is longer than the limit.
     data: Option<Vec<u8>>,
 }
 
@@ -56,7 +57,7 @@ impl Database {
     /// Opens a file for reading.
     ///
     /// # Errors
-    /// A file that is no database of messages.
+    /// A file that is not a database of messages.
     pub(crate) fn open(path: &Path, limits: &Limits) -> Result<Self, NotMcap> {
         let opened = unfinished::open(path, limits)?;
         let connection = &opened.connection;
@@ -69,7 +70,7 @@ impl Database {
         }
         let end = connection
             .query_row("SELECT max(id) FROM messages", [], |row| row.get::<_, Option<i64>>(0))
-            // Damage is met again, and counted, when the messages are read.
+            // If there is damage, it is found again, and counted, when the messages are read.
             .unwrap_or_default();
         let bytes = std::fs::metadata(&opened.path).map_or(0, |about| about.len());
         let claimed = if opened.tells_size { claimed_size(&opened.path).unwrap_or(0) } else { 0 };
@@ -82,7 +83,7 @@ impl Database {
         if let Some(left_out) = &opened.left_out {
             walk.fault("uncommitted_transactions", || left_out.clone());
         }
-        // SQLite reads zeros behind the end of a file, so this is not met later on.
+        // SQLite reads zeros behind the end of a file, so this would not be noticed later.
         if bytes < claimed {
             walk.fault("truncated", || {
                 format!("{bytes} of {claimed} bytes are there; the last messages may be incomplete")
@@ -110,11 +111,11 @@ impl Database {
     /// Reads one message.
     pub(crate) fn step<R: Read>(&mut self, walk: &mut Walk<R>) {
         let (id, stored) = match self.next(walk.limits.record_bytes) {
-            // A damaged page may hold any number, also one that would be met again for ever.
+            // A damaged page may hold any ID, even one that would be repeated for ever.
             Ok(Some((id, _))) if id <= self.last => return self.end(walk, "numbers out of order"),
             Ok(Some(found)) => found,
             Ok(None) => return walk.ended = true,
-            // There is no way to find the messages behind a damaged page.
+            // The messages behind a damaged page cannot be found.
             Err(why) => return self.end(walk, &why.to_string()),
         };
         self.last = id;
@@ -141,7 +142,7 @@ impl Database {
         walk.ended = true;
     }
 
-    /// Returns the next message by its id, without contents if these are of wrong types.
+    /// Returns the next message by its ID, without contents if these have wrong types.
     fn next(&self, longest: u64) -> rusqlite::Result<Option<(i64, Option<Stored>)>> {
         let mut statement = self.opened.connection.prepare_cached(NEXT)?;
         let longest = i64::try_from(longest).unwrap_or(i64::MAX);
@@ -150,19 +151,19 @@ impl Database {
         found.optional()
     }
 
-    /// Returns about how many bytes of the file have been read.
+    /// Returns approximately how many bytes of the file have been read.
     pub(crate) fn position(&self) -> u64 {
         let part = self.last.max(0) as f64 / self.end.max(1) as f64;
         (part.min(1.0) * self.bytes as f64) as u64
     }
 }
 
-/// Returns the size that the header of a database gives: pages, and bytes of each.
+/// Returns the size that the header of a database states: number of pages times bytes per page.
 fn claimed_size(path: &Path) -> std::io::Result<u64> {
     let mut header = [0; 32];
     std::fs::File::open(path)?.read_exact(&mut header)?;
     let page = match u16::from_be_bytes([header[16], header[17]]) {
-        // Does not fit in 16 bits.
+        // 65,536 does not fit in 16 bits.
         1 => 65_536,
         size => u64::from(size),
     };
@@ -176,7 +177,7 @@ fn stored(row: &Row<'_>) -> rusqlite::Result<Stored> {
         topic: row.get(1)?,
         time_ns: row.get(2)?,
         length: length.unwrap_or(0).max(0) as u64,
-        // An empty message is stored as NULL by some recorders.
+        // Some recorders store an empty message as NULL.
         data: match length {
             None => Some(Vec::new()),
             Some(_) => row.get(4)?,
@@ -193,7 +194,8 @@ fn bounded_text(row: &Row<'_>, at: usize, longest: u64) -> rusqlite::Result<Stri
     if text.len() as u64 <= longest { Ok(text) } else { Err(rusqlite::Error::InvalidQuery) }
 }
 
-/// Reads a row of the table of topics. Names are bounded, because all of them are kept.
+/// Reads a row of the table of topics. The length of names is limited, because all of them are
+/// kept.
 fn channel(row: &Row<'_>, longest: u64) -> rusqlite::Result<Channel> {
     Ok(Channel {
         id: row.get(0)?,

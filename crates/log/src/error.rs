@@ -2,12 +2,13 @@ use std::path::{Path, PathBuf};
 
 use crate::camera_info::CalibrationError;
 
-/// Error for a file that is no container of messages: a sentence without its name.
+/// Error for a file that is not a container of messages, as a sentence without the name of the
+/// file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct NotMcap(pub String);
 
-/// Reason for which a log cannot be used at all. Damage inside a log is no error: it is skipped and
+/// Reason why a log cannot be used at all. Damage inside a log is not an error: it is skipped and
 /// counted.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -53,7 +54,7 @@ pub enum LogError {
         path: PathBuf,
         /// Missing topic or calibration.
         wanted: String,
-        /// Nearest name or other advice, or empty.
+        /// Most similar name or other advice; may be empty.
         hint: String,
         /// Topics of the log, one per line.
         present: String,
@@ -67,31 +68,32 @@ pub enum LogError {
         key: String,
         /// The topic.
         topic: String,
-        /// Nearest name, or empty; boxed, because the largest variant is the size of every result.
+        /// Most similar name; may be empty. It is boxed, because every result is as large as the
+        /// largest variant.
         hint: Box<str>,
         /// Topics of the log, one per line.
         present: String,
     },
-    /// A topic that the settings name is of another kind.
+    /// A topic that the settings name has messages of another kind.
     #[error("`{}`: `{key}` under [input] names {topic}, which is {kind}; {remedy}", path.display())]
     WrongTopic {
         /// Path of the file.
         path: PathBuf,
         /// Key under `[input]`.
         key: String,
-        /// Topic of that name.
+        /// Topic with that name.
         topic: String,
         /// Type and encoding of its messages.
         kind: String,
         /// Advice for the user.
         remedy: String,
     },
-    /// The topic of a source of obstacles has messages of another type.
+    /// The topic of an obstacle source has messages of another type.
     #[error("`{}`: source `{name}` of [[collision_monitor.sources]] names {why}", path.display())]
     Source {
         /// Path of the file.
         path: PathBuf,
-        /// Name of the source.
+        /// Name of the obstacle source.
         name: String,
         /// Topic and type of its messages, with the types that the source reads.
         why: String,
@@ -130,7 +132,8 @@ pub enum LogError {
 }
 
 impl LogError {
-    /// Returns the error of a path that cannot be opened or read, from its cause.
+    /// Returns a function that converts the cause to the error for a path that cannot be opened or
+    /// read.
     pub(crate) fn opening(path: &Path) -> impl Fn(std::io::Error) -> Self {
         move |source| Self::Open { path: path.to_owned(), source }
     }

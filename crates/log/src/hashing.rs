@@ -1,4 +1,4 @@
-//! Hash of a log, taken while it is read.
+//! Hash of a log, computed while it is read.
 
 use std::io::Read;
 
@@ -29,7 +29,7 @@ impl<R: Read> Hashing<R> {
     /// Reads the rest, and returns size and hash of everything.
     pub(crate) fn finish(mut self) -> (u64, Sha256) {
         let mut rest = vec![0; 1 << 16];
-        // The hash covers the whole file, also the part behind the last record.
+        // The hash covers the whole file, including the part behind the last record.
         while matches!(self.read(&mut rest), Ok(count) if count > 0) {}
         (self.bytes, self.hash)
     }

@@ -8,10 +8,10 @@ use crate::camera_settings::{CameraSettings, MountSettings};
 use crate::obstacles::ObstacleTopic;
 
 settings! {
-    /// Settings of the input from a log. Topics that are not named are found by message type and
+    /// Settings for reading a log. Topics that are not named are found by message type and
     /// encoding.
     pub struct InputSettings {
-        /// Topic of the colour (or grey) images; of the left ones of a stereo pair.
+        /// Topic of the colour (or grey) images; for a stereo pair, of the left ones.
         pub colour_topic: Option<String>,
         /// Topic of the depth images.
         pub depth_topic: Option<String>,
@@ -32,7 +32,7 @@ settings! {
         /// class.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         pub detection_classes: Vec<String>,
-        /// Topics of further sensors, by the names of their inputs.
+        /// Topics of further sensors, keyed by the names of their inputs.
         #[serde(skip_serializing_if = "BTreeMap::is_empty")]
         pub topics: BTreeMap<String, String> = BTreeMap::new(),
         /// Topic of the right images of a stereo pair.
@@ -42,38 +42,38 @@ settings! {
         /// Maximum difference between the stamps of images that belong together, s.
         #[schemars(range(min = 0.0, max = 10.0))]
         pub pair_tolerance_s: f64 = 0.03,
-        /// Robot frame: X forward, Y left, Z up, on the floor. If tf has `base_footprint` too, and
+        /// Robot frame: X forward, Y left, Z up, on the floor. If tf also has `base_footprint`, and
         /// this is left at `base_link`, `base_footprint` is used.
         pub base_frame: String = "base_link".into(),
         /// Frame in which tf gives the robot's motion.
         pub odom_frame: String = "odom".into(),
-        /// Metres per unit of depth, if the log departs from the convention (millimetres for 16UC1,
-        /// metres for 32FC1); makes mono16 images depth.
+        /// Metres per unit of depth, if the log deviates from the convention (millimetres for
+        /// 16UC1, metres for 32FC1); also makes mono16 images count as depth.
         #[schemars(range(min = 1e-6, max = 1e3))]
         pub depth_unit_m: Option<f64>,
-        /// Makes the depth topic one of disparities: images without the geometry that
-        /// `stereo_msgs/DisparityImage` has, which needs no setting.
+        /// Makes the depth topic one of disparities, for images without the geometry that
+        /// `stereo_msgs/DisparityImage` contains; that type needs no setting.
         pub disparity: Option<DisparitySettings>,
-        /// Columns and rows by which depth images are shifted to lie on colour, if those of the log
-        /// are not registered well (`tagalong doctor` measures it).
+        /// Columns and rows by which depth images are shifted to match the colour images, if those
+        /// of the log are not registered well (`tagalong doctor` measures it).
         #[schemars(inner(range(min = -1000, max = 1000)))]
         pub depth_offset_px: [i32; 2] = [0, 0],
-        /// Camera whose images are used, of several: the folder that its topics share. Or, as a
-        /// table, the pose of the camera, for logs without it in tf, or with a wrong one.
+        /// Camera whose images are used, if there are several: the prefix that its topics share.
+        /// Or, as a table, the pose of the camera, for logs without it in tf, or with a wrong one.
         pub camera: Option<CameraSettings>,
         /// Source of the times of messages.
         pub stamps: StampSource,
         /// Columns and rows to which the circular image of a conical mirror is unwrapped.
         #[schemars(inner(range(min = 8, max = 8192)))]
         pub panorama: [usize; 2] = [480, 120],
-        /// Number of frames by which an image may be late and is still put in order.
+        /// Number of frames by which an image may be late and still be sorted in.
         #[schemars(range(max = 64))]
         pub reorder_frames: usize = 3,
         /// Standard deviation of odometry as a fraction of the travel.
         #[schemars(range(min = 0.0, max = 10.0))]
         pub odometry_sigma: f64 = 0.02,
-        /// Further sources of obstacles. They are no keys under `[input]`: a program fills them in
-        /// from `[[collision_monitor.sources]]` of its pipeline.
+        /// Further obstacle sources. They are not keys of `[input]`: a program fills them in from
+        /// `[[collision_monitor.sources]]` of its pipeline.
         #[serde(skip)]
         #[schemars(skip)]
         pub sources: Vec<ObstacleTopic>,
@@ -89,7 +89,7 @@ impl InputSettings {
         }
     }
 
-    /// Returns the topic that the settings name for an input. A log without it is refused.
+    /// Returns the topic that the settings name for an input. A log without it is rejected.
     pub fn topic_of(&self, input: Input) -> Option<&str> {
         match input {
             Input::Colour => self.colour_topic.as_deref(),
@@ -110,7 +110,7 @@ impl InputSettings {
     }
 }
 
-/// Images of disparity: depth is focal length times baseline, divided by disparity.
+/// Settings of disparity images: depth is focal length times baseline, divided by disparity.
 #[derive(Clone, Copy, Debug, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct DisparitySettings {
@@ -118,8 +118,8 @@ pub struct DisparitySettings {
     /// default.
     #[schemars(range(min = 1e-6, max = 1e3))]
     pub unit_px: Option<f64>,
-    /// Distance of the right camera from the left one, m; by default that of the right camera's
-    /// calibration.
+    /// Baseline: distance of the right camera from the left one, m; by default that of the right
+    /// camera's calibration.
     #[schemars(range(min = 1e-4, max = 100.0))]
     pub baseline_m: Option<f64>,
 }
@@ -128,12 +128,12 @@ pub struct DisparitySettings {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum StampSource {
-    /// Their stamps, unless these are never set: then the times of recording.
+    /// Their stamps, or the recording times if the stamps are never set.
     #[default]
     Auto,
     /// Their stamps.
     Header,
-    /// The times at which they were recorded.
+    /// The recording times.
     Recording,
 }
 

@@ -1,4 +1,4 @@
-//! Description of a log, for people and for scripts.
+//! Description of a log, for users and for scripts.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -31,11 +31,11 @@ pub struct TopicFacts {
     pub undecodable: u64,
     /// Messages per second of log time; `None` with fewer than two.
     pub rate_hz: Option<f64>,
-    /// Description of its images, if it has any.
+    /// Description of the images, if there are any.
     pub image: Option<ImageFacts>,
     /// Frame id of the first message.
     pub frame_id: Option<String>,
-    /// Capture times of its images; `None` with fewer than two.
+    /// Capture times of the images; `None` with fewer than two.
     pub timing: Option<Timing>,
 }
 
@@ -65,14 +65,14 @@ pub struct Inspection {
     pub skew: Option<Skew>,
     /// Transforms: each frame with its parent.
     pub transforms: BTreeMap<String, String>,
-    /// Use of each image, scan, detection and odometry topic, with reasons.
+    /// Use of each topic of images, scans, detections and odometry, with reasons.
     pub inputs: InputAccount,
     /// Inputs that a pipeline could use: `colour`, `depth`, `right`, `odometry`, `laser`, `detections`, and
     /// the names of further sensors.
     pub usable: Vec<&'static str>,
-    /// Reason for which no frames can be made, if so.
+    /// Reason why no frames can be made, if so.
     pub unusable: Option<String>,
-    /// Counters of the walk through the file.
+    /// Counters from reading the file.
     pub counters: BTreeMap<&'static str, u64>,
     /// Further remarks.
     pub notes: Vec<String>,
@@ -80,19 +80,19 @@ pub struct Inspection {
     pub data_lost: bool,
 }
 
-/// Inspected log, ready to be read.
+/// Inspected log that is ready to be read.
 #[non_exhaustive]
 pub struct Examination {
     /// Description of the log.
     pub inspection: Inspection,
-    /// Frames of the log, with the requested inputs, else with all that there are; `None` if no
-    /// frames can be made.
+    /// Frames of the log, with the requested inputs, or otherwise with all inputs that it has;
+    /// `None` if no frames can be made.
     pub frames: Option<FrameSource>,
-    /// Error with the requested inputs, if the frames are not made from them.
+    /// Error for the requested inputs, if the frames are not made from them.
     pub refusal: Option<LogError>,
 }
 
-/// Inspects a log. A log without usable images is described all the same.
+/// Inspects a log. A log without usable images is described as well.
 ///
 /// # Errors
 /// A file that cannot be opened or is not MCAP; invalid settings.
@@ -107,7 +107,7 @@ pub fn inspect(
 /// Inspects a log, and opens it for a pipeline with these inputs.
 ///
 /// # Errors
-/// As [`inspect`]; inputs that the log lacks are no error but in [`Examination::refusal`].
+/// As [`inspect`]; missing inputs are not an error but reported in [`Examination::refusal`].
 pub fn examine(
     path: &Path,
     input: &InputSettings,
@@ -116,7 +116,7 @@ pub fn examine(
 ) -> Result<Examination, LogError> {
     input.check()?;
     let scan = Arc::new(Scan::read(path, input.depth_unit_m, limits)?);
-    // Described with all inputs, even if the pipeline uses only some of them.
+    // The description covers all inputs, even if the pipeline uses only some of them.
     let everything = FrameSource::of_scan(Arc::clone(&scan), input, limits, Inputs::ANY);
     let mut inspection = Inspection::of_scan(&scan);
     match &everything {
@@ -134,7 +134,7 @@ pub fn examine(
 }
 
 impl Inspection {
-    /// Describes a log as far as possible without frames.
+    /// Describes a log as far as that is possible without frames.
     fn of_scan(scan: &Scan) -> Self {
         let first = scan.topics.values().map(|topic| topic.first_log_time).min().unwrap_or(0);
         let last = scan.topics.values().map(|topic| topic.last_log_time).max().unwrap_or(0);
@@ -186,7 +186,7 @@ impl Inspection {
         self.skew = both.and_then(|(colour, depth)| depth.skew_from(colour, tolerance_s));
     }
 
-    /// Returns the topic of that name.
+    /// Returns the topic with that name.
     pub fn topic(&self, name: &str) -> Option<&TopicFacts> {
         self.topics.iter().find(|topic| topic.topic == name)
     }

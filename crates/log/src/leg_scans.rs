@@ -14,7 +14,7 @@ use crate::{Limits, LogError};
 /// Topic suffix of annotated legs.
 const LEGS: &str = "leg_cluster_positions";
 
-/// Scan with the annotated legs in it.
+/// Scan with its annotated legs.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct LegScan {
@@ -22,16 +22,16 @@ pub struct LegScan {
     pub topic: String,
     /// The scan, in the frame of the scanner.
     pub scan: CoreScan,
-    /// Middles of the legs in the frame of the scanner, m; empty where there are none.
+    /// Centres of the legs in the frame of the scanner, m; empty if there are none.
     pub legs: Vec<Point2<f64>>,
 }
 
-/// Reads the scans of a log with their legs. Scans and annotations are paired by their order, because
-/// the stamps are those of the extraction. In a log without a topic of annotations there are no
+/// Reads the scans of a log with their legs. Scans and annotations are paired by their order,
+/// because the stamps are those of the extraction. A log without a topic of annotations contains no
 /// people.
 ///
 /// # Errors
-/// A log that cannot be opened, that is damaged, or that has not as many annotations as scans.
+/// A log that cannot be opened, that is damaged, or whose numbers of annotations and scans differ.
 pub fn read_leg_scans(path: &Path, limits: &Limits) -> Result<Vec<LegScan>, LogError> {
     let file = LogFile::open(path, limits)?;
     let contents = file.path().to_owned();

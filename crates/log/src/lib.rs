@@ -1,17 +1,17 @@
-//! Input and output of logs: MCAP files with ROS 2 messages; ROS 1 bags as input, too.
+//! Input and output of logs: MCAP files with ROS 2 messages, and as input also ROS 1 bags.
 //!
-//! A log is read twice. The first pass decodes no image: it finds the topics, the calibrations and
+//! A log is read twice. The first pass decodes no images: it finds the topics, the calibrations and
 //! the static transforms of the whole log, counts damage and hashes the file, so that every missing
 //! input is known before the first frame. The second pass is the [`FrameSource`]: it puts images in
 //! order, pairs them, looks up the poses of camera and robot, and returns one [`LogFrame`] after
-//! the other. Memory holds a few frames, however long the log is.
+//! the other. Only a few frames are in memory, however long the log is.
 //!
-//! Messages that arrive live, over a network, take the same way: [`Listening`] is the first pass,
+//! Live messages from a network are processed in the same way: [`Listening`] is the first pass,
 //! [`LiveSource`] the second.
 //!
 //! The contents of a file are not trusted: see [`LogWalker`] for the containers, [`msgs`] for
-//! messages, [`images`] for pictures and [`Limits`] for sizes. Intact data is used; lost data is
-//! counted under a name.
+//! messages, [`images`] for images and [`Limits`] for sizes. Intact data is used; lost data is
+//! counted by cause.
 
 mod attachment;
 mod bag;

@@ -2,8 +2,8 @@ use tagalong_core::settings;
 
 settings! {
     /// Limits on the sizes that a log may claim. A file that claims more is damaged or hostile:
-    /// that part is skipped and counted. The limits are absolute, never ratios, because a regular
-    /// file of dark frames compresses a thousandfold.
+    /// that part is skipped and counted. The limits are absolute, not ratios, because even a
+    /// regular file of dark frames compresses a thousandfold.
     #[derive(Eq)]
     pub struct Limits {
         /// Maximum length of a record (a message with its image), bytes.

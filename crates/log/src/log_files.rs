@@ -1,5 +1,5 @@
-//! Log of one file, or of several: a rosbag2 folder, whose recorder started a new file now and
-//! then. Its parts are read one after the other, as one log.
+//! Log that consists of one file, or of several: a rosbag2 folder whose recorder split the
+//! recording. The parts are read one after the other, as one log.
 
 use std::fs::File;
 use std::io::Read as _;
@@ -12,11 +12,11 @@ pub const TRUTH_TOPIC: &str = "/truth/people";
 
 /// File of a rosbag2 folder that lists its parts.
 const METADATA: &str = "metadata.yaml";
-/// Endings of the files of a rosbag2 folder.
+/// Extensions of the files of a rosbag2 folder.
 const KINDS: [&str; 2] = ["mcap", "db3"];
-/// Endings that rosbag2 adds to compressed files, the second one of the command `zstd`.
+/// Extensions of compressed files: that of rosbag2, and that of the command `zstd`.
 const PACKED: [&str; 2] = [".zstd", ".zst"];
-/// Largest part of the metadata that is read, bytes. A list of 10,000 parts fits.
+/// Maximum size of the metadata that is read, bytes. A list of 10,000 parts fits.
 const MAX_METADATA: u64 = 1 << 20;
 
 /// Files of one log, in the order of recording.
@@ -28,8 +28,8 @@ pub struct LogFiles {
 
 impl LogFiles {
     /// Finds the files of a log: a file itself, or the parts of a folder. A folder is one log if it
-    /// holds a `metadata.yaml`, a single `.mcap` or `.db3`, or files `NAME_0.mcap`, `NAME_1.mcap`, ...
-    /// of one name. Where a folder has both kinds, those of MCAP are read.
+    /// contains a `metadata.yaml`, a single `.mcap` or `.db3`, or files `NAME_0.mcap`,
+    /// `NAME_1.mcap`, ... with the same name. If a folder has both kinds, the MCAP files are read.
     ///
     /// # Errors
     /// [`LogError::Open`] for a path that cannot be read; [`LogError::NotAFile`] for a pipe, a
@@ -39,10 +39,10 @@ impl LogFiles {
             return Ok(Self { parts: vec![path.to_owned()], missing: Vec::new() });
         }
         let mut parts = parts_in(path).map_err(LogError::opening(path))?;
-        // The order of a directory depends on the file system.
+        // The order of directory entries depends on the file system.
         parts.sort_by_key(|part| part_number(part));
         let listed = listed_parts(&path.join(METADATA));
-        // Split by the recorder: one name, and a number.
+        // True for files that the recorder split: the same name, and a number.
         let names: Vec<&str> = parts.iter().map(|part| part_name(part)).collect();
         let is_split = names.windows(2).all(|pair| pair[0] == pair[1]);
         if parts.is_empty() || (listed.is_none() && !is_split) {
@@ -56,18 +56,18 @@ impl LogFiles {
                 },
             });
         }
-        // Only names count: metadata may come from another machine.
+        // Only the file names count, because the metadata may come from another machine.
         let mut missing = listed.unwrap_or_default();
         missing.retain(|name| !parts.iter().any(|part| unpacked_name(part) == stripped(name)));
         Ok(Self { missing, parts })
     }
 
-    /// Returns the files.
+    /// Returns the files of the log.
     pub fn parts(&self) -> &[PathBuf] {
         &self.parts
     }
 
-    /// Returns the names of the files that the metadata lists and that are not there.
+    /// Returns the names of the files that the metadata lists but that are missing.
     pub fn missing(&self) -> &[String] {
         &self.missing
     }
@@ -90,7 +90,7 @@ pub(crate) fn open_file(path: &Path) -> Result<File, LogError> {
     Err(LogError::NotAFile { path: path.to_owned(), kind, remedy })
 }
 
-/// Returns the name of a file without the ending of a compressed one.
+/// Returns the name of a file without the extension of a compressed one.
 fn unpacked_name(path: &Path) -> &str {
     stripped(path.file_name().and_then(|name| name.to_str()).unwrap_or_default())
 }
@@ -99,8 +99,9 @@ fn stripped(name: &str) -> &str {
     PACKED.iter().find_map(|ending| name.strip_suffix(ending)).unwrap_or(name)
 }
 
-/// Returns the files of a folder that have one of the [`KINDS`]: those of the first kind that is present.
-/// Players leave a compressed file beside its unpacked copy; then the copy alone is returned.
+/// Returns the files of a folder that have one of the [`KINDS`]: those of the first kind that is
+/// present. Players leave a compressed file beside its unpacked copy; then only the copy is
+/// returned.
 fn parts_in(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let files = std::fs::read_dir(folder)?.flatten().map(|entry| entry.path());
     let files: Vec<PathBuf> = files.collect();
@@ -120,7 +121,7 @@ fn parts_in(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     Ok(Vec::new())
 }
 
-/// Splits `NAME_12.mcap` into its name and its number; a name without a number is number 0.
+/// Splits `NAME_12.mcap` into its name and its number; a name without a number has the number 0.
 fn name_and_number(part: &Path) -> (&str, u64) {
     let name = unpacked_name(part);
     let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
@@ -132,19 +133,19 @@ fn part_name(part: &Path) -> &str {
     name_and_number(part).0
 }
 
-/// Returns the key of the order of recording: by number, because `_10` comes after `_9`.
+/// Returns the sort key for the order of recording: the number, because `_10` comes after `_9`.
 fn part_number(part: &Path) -> (u64, PathBuf) {
     (name_and_number(part).1, part.to_owned())
 }
 
-/// Returns the files that the metadata lists under `relative_file_paths`; `None` without
-/// metadata. A list of names is all that is read of it, so this is no YAML parser.
+/// Returns the files that the metadata lists under `relative_file_paths`; `None` without metadata.
+/// Only this list of names is read, so no YAML parser is needed.
 fn listed_parts(metadata: &Path) -> Option<Vec<String>> {
     let mut text = String::new();
     open_file(metadata).ok()?.take(MAX_METADATA).read_to_string(&mut text).ok()?;
     let lines = text.lines().map(str::trim).skip_while(|line| *line != "relative_file_paths:");
     let items = lines.skip(1).map_while(|line| line.strip_prefix("- "));
-    // Older recorders write the folder before the name.
+    // Older recorders write the folder in front of the name.
     let names = items.filter_map(|item| item.trim_matches(['"', '\'']).rsplit('/').next());
     Some(
         names

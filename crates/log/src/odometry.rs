@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use nalgebra::Isometry2;
 use tagalong_core::{MAX_ODOMETRY_GAP_S, MAX_ODOMETRY_STEP_M, Stamp};
 
-/// Time for which the motion is continued behind the last pose, s.
+/// Time for which the motion is extrapolated beyond the last pose, s.
 const EXTRAPOLATE_S: f64 = 0.2;
 /// Time for which poses are kept, s.
 const KEPT_S: f64 = 15.0;
@@ -13,26 +13,26 @@ const KEPT_S: f64 = 15.0;
 const MAX_POSES: usize = 16_384;
 /// Step back of the clock beyond which it has jumped, s.
 const CLOCK_JUMP_S: f64 = 1.0;
-/// Time after a frame beyond which a reading is no odometry of that frame, s.
+/// Maximum time from a frame to a later reading that still counts as odometry of that frame, s.
 pub(crate) const AHEAD_S: f64 = 1.0;
 
 /// Pose with its time.
 type TimedPose = (Stamp, Isometry2<f64>);
 
-/// Pose at a given time.
+/// Pose at a requested time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct PoseAt {
     /// `odom_from_robot`.
     pub pose: Isometry2<f64>,
-    /// True if no odometry was near in time and the pose is a guess.
+    /// True if no odometry was near in time, so that the pose is a guess.
     pub stale: bool,
 }
 
 /// Returns the age of odometry at a given time, s, from the times of the readings before and after
-/// it: 0 between readings at most [`MAX_ODOMETRY_GAP_S`] apart, else the time since the reading before.
-/// Without one it is the time to the reading after, which may be the first of all. Infinite without
-/// either; a reading after the time by more than [`AHEAD_S`] is none.
+/// it: 0 between readings at most [`MAX_ODOMETRY_GAP_S`] apart, otherwise the time since the
+/// reading before. Without one it is the time until the reading after, which may be the first of
+/// all. It is infinite without either; a reading more than [`AHEAD_S`] later does not count.
 pub(crate) fn age_between(before: Option<Stamp>, after: Option<Stamp>, at: Stamp) -> f64 {
     let after = after.filter(|after| after.seconds_since(at) <= AHEAD_S);
     match (before, after) {
@@ -44,14 +44,14 @@ pub(crate) fn age_between(before: Option<Stamp>, after: Option<Stamp>, at: Stamp
     }
 }
 
-/// Odometry of the last seconds.
+/// Buffer of the odometry of the last seconds.
 #[derive(Clone, Debug, Default)]
 pub struct PoseBuffer {
     poses: VecDeque<TimedPose>,
 }
 
 impl PoseBuffer {
-    /// Adds a pose; returns false if it is not finite. After a jump of the clock the old poses are
+    /// Adds a pose; returns false if it is not finite. If the clock has jumped, the old poses are
     /// removed.
     pub fn push(&mut self, stamp: Stamp, pose: Isometry2<f64>) -> bool {
         let numbers = [pose.translation.x, pose.translation.y, pose.rotation.angle()];
@@ -84,15 +84,15 @@ impl PoseBuffer {
         }
     }
 
-    /// Returns the pose at a given time, interpolated; `None` without odometry. Readings of more than
-    /// a second later are not used.
+    /// Returns the pose at a given time, interpolated; `None` without odometry. Readings that are
+    /// more than a second later are not used.
     pub fn at(&self, stamp: Stamp) -> Option<PoseAt> {
         let (before, after) = self.around(stamp);
         let after = after.filter(|(at, _)| at.seconds_since(stamp) <= AHEAD_S);
         match (before, after) {
             (Some(a), Some(b)) => Some(PoseAt {
                 pose: blend(a, b, stamp),
-                // A pose exactly at the stamp is valid, however long the gap before it.
+                // A pose exactly at the stamp is valid, whatever the gap before it.
                 stale: b.0 != stamp && b.0.seconds_since(a.0) > MAX_ODOMETRY_GAP_S,
             }),
             (Some(last), None) => Some(self.beyond(last, stamp)),
@@ -103,15 +103,15 @@ impl PoseBuffer {
         }
     }
 
-    /// Returns the age of odometry at a given time, s: 0 where the pose is interpolated, infinite
-    /// without any.
+    /// Returns the age of odometry at a given time, s: 0 if the pose is interpolated, infinite
+    /// without odometry.
     pub fn age_s(&self, stamp: Stamp) -> f64 {
         let (before, after) = self.around(stamp);
         age_between(before.map(|(at, _)| at), after.map(|(at, _)| at), stamp)
     }
 
-    /// Returns the time from a frame to the next reading, s, if it is too late to be odometry of that
-    /// frame: its clock is another one, or the recording of odometry begins later.
+    /// Returns the time from a frame to the next reading, s, if that is too late to be odometry of
+    /// the frame, because it has another clock, or because the recording of odometry begins later.
     pub(crate) fn ahead_s(&self, stamp: Stamp) -> Option<f64> {
         let (_, after) = self.around(stamp);
         after.map(|(at, _)| at.seconds_since(stamp)).filter(|ahead_s| *ahead_s > AHEAD_S)
@@ -124,14 +124,14 @@ impl PoseBuffer {
         (before, self.poses.get(after).copied())
     }
 
-    /// Extrapolates behind the last pose: the last motion goes on for a short time.
+    /// Extrapolates beyond the last pose: the last motion continues for a short time.
     fn beyond(&self, last: (Stamp, Isometry2<f64>), stamp: Stamp) -> PoseAt {
         let ahead = stamp.seconds_since(last.0);
-        // Not simply the last two of all: poses of far later times may follow.
+        // These are not simply the last two poses, because poses of much later times may follow.
         let place = self.poses.partition_point(|(at, _)| *at < last.0);
         let known = place.checked_sub(1).map(|place| self.poses[place]);
         let pose = match known {
-            // Two poses far apart in time do not give the present velocity.
+            // Two poses far apart in time do not determine the present velocity.
             Some(previous) if last.0.seconds_since(previous.0) <= MAX_ODOMETRY_GAP_S => {
                 blend(previous, last, last.0.plus_seconds(ahead.min(EXTRAPOLATE_S)))
             }
@@ -145,7 +145,7 @@ impl PoseBuffer {
         let pairs = self.poses.iter().zip(self.poses.iter().skip(1));
         pairs.filter(|(a, b)| a.0 < to && from < b.0).any(|(a, b)| {
             (b.1.translation.vector - a.1.translation.vector).norm() > MAX_ODOMETRY_STEP_M
-                // A long step over a gap may be travel.
+                // A large step over a gap may be real motion.
                 && b.0.seconds_since(a.0) <= MAX_ODOMETRY_GAP_S
         })
     }

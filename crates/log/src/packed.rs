@@ -1,9 +1,9 @@
-//! Compression by rosbag2: of whole files (`compression_mode: FILE`) and of single messages
+//! Compression in rosbag2, of whole files (`compression_mode: FILE`) or of single messages
 //! (`MESSAGE`).
 //!
-//! No metadata is needed for either: a compressed file or message starts with the magic of zstd,
-//! which neither a container nor a message in CDR does. A file is unpacked to a temporary one,
-//! because a database is read by its path; sizes are bounded by [`Limits`].
+//! Neither needs metadata: a compressed file or message starts with the magic bytes of zstd, which
+//! neither a container nor a message in CDR does. A file is unpacked to a temporary one, because a
+//! database is read by its path; sizes are bounded by [`Limits`].
 
 use std::fs::File;
 use std::io::{Read, Seek as _, Write as _};
@@ -16,14 +16,14 @@ use zstd::zstd_safe::get_frame_content_size;
 use crate::log_files::open_file;
 use crate::{Limits, LogError};
 
-/// First bytes of a frame of zstd.
+/// Magic bytes of a zstd frame.
 const MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
-/// Longest header of a frame, bytes.
+/// Maximum length of a frame header, bytes.
 const MAX_FRAME_HEADER: usize = 18;
-/// Largest window of a frame that is accepted, as a power of two: that of the highest levels.
+/// Maximum window of a frame that is accepted, as a power of two: that of the highest levels.
 const MAX_WINDOW_LOG: u32 = 27;
 
-/// Returns true for data that is compressed.
+/// Returns true for compressed data.
 pub(crate) fn is_packed(data: &[u8]) -> bool {
     data.starts_with(&MAGIC)
 }
@@ -36,7 +36,8 @@ fn too_long(length: u64, limit: u64) -> (&'static str, String) {
 /// Unpacks a message.
 ///
 /// # Errors
-/// The counter and the reason for a message that is damaged or longer than a record may be.
+/// The counter and the reason for a message that is damaged or exceeds the maximum length of a
+/// record.
 pub(crate) fn unpack_message(
     data: &[u8],
     limits: &Limits,
@@ -44,21 +45,21 @@ pub(crate) fn unpack_message(
 ) -> Result<(), (&'static str, String)> {
     out.clear();
     let longest = limits.record_bytes;
-    // Stated by most writers; a wrong one is noticed when the message is unpacked.
+    // Most writers state the size; a wrong one is noticed while the message is unpacked.
     let claimed = get_frame_content_size(data).ok().flatten().unwrap_or(0);
     if claimed > longest {
         return Err(too_long(claimed, longest));
     }
     let unpacked = Decoder::with_buffer(data).and_then(|mut decoder| {
         decoder.window_log_max(MAX_WINDOW_LOG)?;
-        // One byte beyond the limit is enough to notice it.
+        // One byte beyond the limit is enough to detect an excess.
         decoder.take(longest + 1).read_to_end(out)
     });
     match unpacked {
         Ok(length) if length as u64 > longest => Err(too_long(longest + 1, longest)),
         Ok(_) => Ok(()),
         Err(error) => {
-            let why = format!("a compressed message does not unpack: {error}");
+            let why = format!("a compressed message cannot be unpacked: {error}");
             Err(("damaged_records", why))
         }
     }
@@ -68,9 +69,9 @@ pub(crate) fn unpack_message(
 pub struct LogFile {
     file: File,
     path: PathBuf,
-    /// Deletes the temporary file in the end.
+    /// Deletes the temporary file when it is dropped.
     _unpacked: Option<TempPath>,
-    /// Damage that was met while it was unpacked.
+    /// Damage that was found while the file was unpacked.
     fault: Option<String>,
 }
 
@@ -102,7 +103,8 @@ impl LogFile {
         &self.path
     }
 
-    /// Describes the damage that was met while the file was unpacked; the bytes before it are there.
+    /// Describes the damage that was found while the file was unpacked; the bytes before it are
+    /// there.
     pub(crate) fn fault(&self) -> Option<&str> {
         self.fault.as_deref()
     }
@@ -127,7 +129,7 @@ fn no_room(error: std::io::Error) -> String {
     format!("it cannot be unpacked in {}: {error}; TMPDIR names another", folder.display())
 }
 
-/// Unpacks a file to a temporary one, as far as it is whole.
+/// Unpacks a file to a temporary one, up to the first damage.
 fn unpack_file(packed: File, limits: &Limits) -> Result<LogFile, String> {
     let mut out = NamedTempFile::new().map_err(no_room)?;
     let mut decoder = Decoder::new(packed).map_err(|error| error.to_string())?;
@@ -138,7 +140,9 @@ fn unpack_file(packed: File, limits: &Limits) -> Result<LogFile, String> {
         let count = match decoder.read(&mut step) {
             Ok(0) => break None,
             Ok(count) => count,
-            Err(error) => break Some(format!("it does not unpack behind byte {written}: {error}")),
+            Err(error) => {
+                break Some(format!("it cannot be unpacked after byte {written}: {error}"));
+            }
         };
         written += count as u64;
         if written > limits.file_bytes {

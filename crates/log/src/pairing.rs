@@ -1,4 +1,4 @@
-//! Ordering of images by stamp, and pairing of those that belong together.
+//! Sorting of images by stamp, and pairing of those that belong together.
 
 use std::collections::VecDeque;
 
@@ -16,7 +16,7 @@ pub(crate) struct Payload {
 }
 
 impl Payload {
-    /// Keeps a message that begins with a header, without decoding the rest.
+    /// Stores a message that begins with a header, without decoding the rest.
     ///
     /// # Errors
     /// A message without a header.
@@ -24,25 +24,26 @@ impl Payload {
         Ok(Self::new(decode(message.data)?, message.data))
     }
 
-    /// Keeps a message with this header.
+    /// Stores a message with this header.
     pub(crate) fn new(header: Header, data: &[u8]) -> Self {
         Self { stamp: header.stamp(), frame_id: header.frame_id, data: data.to_vec() }
     }
 }
 
-/// Maximum number of images kept of a second stream; older ones are not near any image to come.
+/// Maximum number of stored images of a second stream; older ones are too far from any image to
+/// come.
 const MAX_WAITING: usize = 64;
-/// Maximum number of bytes kept of a second stream, unless a few images alone are larger.
+/// Maximum number of stored bytes of a second stream, unless a few images alone exceed it.
 const MAX_WAITING_BYTES: usize = 40 << 20;
-/// Number of images that are kept regardless of their size.
+/// Number of images that are stored whatever their size.
 const MIN_WAITING: usize = 4;
 
-/// Images of a second stream (depth, right) that wait for their partner.
+/// Images of a second stream (depth, right) that wait for their partners.
 #[derive(Debug, Default)]
 pub(crate) struct Waiting {
     images: VecDeque<Payload>,
     aside: VecDeque<Payload>,
-    /// Number of images dropped without a partner.
+    /// Number of images that were dropped without a partner.
     unpaired: u64,
 }
 
@@ -62,13 +63,13 @@ impl Waiting {
         count > MAX_WAITING || count > MIN_WAITING && bytes > MAX_WAITING_BYTES
     }
 
-    /// Returns the time between a waiting image and a stamp, s.
+    /// Returns the time difference between a waiting image and a stamp, s.
     fn off_s(&self, image: usize, stamp: Stamp) -> f64 {
         self.images[image].stamp.seconds_since(stamp).abs()
     }
 
     /// Takes the image nearest to `stamp` if it is within the tolerance and not nearer to the next
-    /// image of the other stream. Images older than the tolerance are dropped.
+    /// image of the other stream. Images that are older than the tolerance allows are dropped.
     pub(crate) fn take(
         &mut self,
         stamp: Stamp,
@@ -100,15 +101,15 @@ impl Waiting {
         }
     }
 
-    /// Keeps, after a jump of the clock, the images older than `stamp`, which are hence of the new
-    /// time, for [`Waiting::restore`].
+    /// Sets aside, after a jump of the clock, the images older than `stamp`, which belong to the
+    /// new time, for [`Waiting::restore`].
     pub(crate) fn set_aside(&mut self, stamp: Stamp) {
         let first_old = self.images.partition_point(|image| image.stamp < stamp);
         let old = self.images.split_off(first_old);
         self.aside = std::mem::replace(&mut self.images, old);
     }
 
-    /// Drops the rest of the old time and continues with the images that were set aside.
+    /// Drops the remaining images of the old time and continues with those that were set aside.
     pub(crate) fn restore(&mut self) {
         if !self.aside.is_empty() {
             self.unpaired += self.images.len() as u64;
@@ -116,7 +117,8 @@ impl Waiting {
         }
     }
 
-    /// Removes all images at the end; returns the number without a partner since the last call.
+    /// Removes all images at the end; returns the number of images without a partner since the last
+    /// call.
     pub(crate) fn leave(&mut self) -> u64 {
         let left = self.images.len() + self.aside.len();
         self.images.clear();
@@ -125,7 +127,7 @@ impl Waiting {
     }
 }
 
-/// Image with the stamp of the next one.
+/// Image together with the stamp of the next one.
 pub(crate) type Popped = (Payload, Option<Stamp>);
 
 /// Result of the arrival of an image.
@@ -133,17 +135,17 @@ pub(crate) type Popped = (Payload, Option<Stamp>);
 pub(crate) enum Arrival {
     /// The image waits for its turn.
     Queued,
-    /// The image is another one again: the same stamp and the same bytes.
+    /// The image is a duplicate: it has the same stamp and the same bytes as another one.
     Duplicate,
-    /// Another image with the same stamp, which is lost.
+    /// Another image has the same stamp; this one is lost.
     SameStamp,
-    /// The image is older than the last one delivered; the next image will show if it is late or if
-    /// the clock has jumped.
+    /// The image is older than the last one that was delivered; the next image will show whether it
+    /// is late or the clock has jumped.
     Suspect,
     /// The previous image was late and is dropped; this one waits.
     LateBefore,
-    /// The clock has jumped back: all images of the old time are ready now, and the queue goes on
-    /// with the new one.
+    /// The clock has jumped back: all images of the old time are ready now, and the queue continues
+    /// with the new time.
     Jumped,
 }
 
@@ -191,7 +193,7 @@ impl Reorder {
                 Arrival::LateBefore
             }
             (Some(first), true) => {
-                // Two old images in a row are no late ones: the clock has jumped.
+                // Two old images in a row are not late: the clock has jumped.
                 self.ready.append(&mut self.queue);
                 self.last = None;
                 self.enqueue(first);
@@ -201,8 +203,8 @@ impl Reorder {
         }
     }
 
-    /// Returns true if an image with the same stamp has the same bytes, false if it has others; `None`
-    /// if there is none with that stamp.
+    /// Returns true if an image with the same stamp has the same bytes, false if it has different
+    /// ones; `None` if no image has that stamp.
     fn meets_again(&self, payload: &Payload) -> Option<bool> {
         let waiting = self.queue.iter().chain(&self.suspect);
         if let Some(other) = waiting.into_iter().find(|other| other.stamp == payload.stamp) {
@@ -216,8 +218,8 @@ impl Reorder {
         self.queue.insert(place, payload);
     }
 
-    /// Returns the next image in order, if no earlier one can follow (or the log has ended), with
-    /// the stamp of the next one.
+    /// Returns the next image in order, together with the stamp of the one after it, if no earlier
+    /// one can follow (or the log has ended).
     pub(crate) fn pop(&mut self, ended: bool) -> Option<Popped> {
         if let Some(payload) = self.ready.pop_front() {
             return Some((payload, self.ready.front().map(|next| next.stamp)));
@@ -231,9 +233,9 @@ impl Reorder {
         Some((payload, self.queue.front().map(|next| next.stamp)))
     }
 
-    /// Returns the newest complete image, without waiting for earlier ones; without a complete one,
-    /// the image that has waited longest, once more than the window wait. Also returns the number
-    /// of older images that were dropped.
+    /// Returns the newest complete image, without waiting for earlier ones. Without a complete one
+    /// it returns the image that has waited longest, once the number of waiting images exceeds the
+    /// window. Also returns the number of older images that were dropped.
     pub(crate) fn pop_newest(
         &mut self,
         is_complete: impl Fn(Stamp) -> bool,
@@ -244,7 +246,7 @@ impl Reorder {
         (self.pop(newest.is_some()), (outdated + older) as u64)
     }
 
-    /// Returns true if no images from before a jump are left.
+    /// Returns true if no images from before a jump remain.
     pub(crate) fn is_flushed(&self) -> bool {
         self.ready.is_empty()
     }
@@ -254,12 +256,13 @@ impl Reorder {
         self.last
     }
 
-    /// Returns the newest stamp that waits.
+    /// Returns the newest stamp in the queue.
     pub(crate) fn newest(&self) -> Option<Stamp> {
         self.queue.back().map(|image| image.stamp)
     }
 
-    /// Drops an image held back as suspect, at the end of the log; returns true if there was one.
+    /// Drops an image that is held back as suspect, at the end of the log; returns true if there
+    /// was one.
     pub(crate) fn drop_suspect(&mut self) -> bool {
         self.suspect.take().is_some()
     }

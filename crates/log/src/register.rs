@@ -4,13 +4,13 @@ use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use tagalong_core::DepthImage;
 use tagalong_geometry::{Camera, Lens};
 
-/// Overlap of neighbouring splats, so that stretching leaves no holes.
+/// Factor by which splats overlap, so that stretching leaves no holes.
 const OVERLAP: f64 = 1.1;
 /// Maximum side of a splat, pixels.
 const MAX_SPLAT_PX: f64 = 8.0;
 
-/// Registration of depth images of one camera to another one. The rays of the depth camera, the
-/// costly part for a distorted lens, are computed once.
+/// Registration of depth images of one camera to another one. The rays of the depth camera, which
+/// are costly for a distorted lens, are computed once.
 #[derive(Clone, Debug)]
 pub struct Registration {
     rays: Vec<Vector3<f64>>,
@@ -21,8 +21,8 @@ pub struct Registration {
 }
 
 impl Registration {
-    /// Prepares the registration from the lenses and sizes of both cameras (their poses on the
-    /// robot are not used) and the pose of the depth camera in the colour camera.
+    /// Prepares the registration for the lenses and sizes of both cameras (their poses on the robot
+    /// are not used) and for the pose of the depth camera relative to the colour camera.
     pub fn new(depth: &Camera, colour: &Camera, colour_from_depth: Isometry3<f64>) -> Self {
         let pixels = (0..depth.height).flat_map(|y| (0..depth.width).map(move |x| (x, y)));
         Self {
@@ -39,8 +39,8 @@ impl Registration {
         self.colour_from_depth == *colour_from_depth
     }
 
-    /// Returns the depth image in the view of the colour camera, with nearer surfaces in front of
-    /// farther ones. Each reading covers a square of the size of its pixel in that view, so that a
+    /// Returns the depth image as seen by the colour camera, with nearer surfaces in front of
+    /// farther ones. Each reading covers a square of the size of its pixel in that image, so that a
     /// larger colour image has no holes. `None` if the image does not have the size of the depth
     /// camera.
     pub fn apply(&self, depth: &DepthImage) -> Option<DepthImage> {
@@ -66,7 +66,7 @@ impl Registration {
         let z = point.z as f32;
         for y in covered(pixel.y, side, out.height()) {
             for old in &mut out.pixels_mut()[y * width..][columns.clone()] {
-                // Also without a surface so far.
+                // Also if there is no surface yet.
                 if old.is_nan() || z < *old {
                     *old = z;
                 }
@@ -80,7 +80,7 @@ fn focal(camera: &Camera) -> f64 {
     0.5 * (lens.fx + lens.fy)
 }
 
-/// Returns the pixels with centres within half a side of `centre`.
+/// Returns the pixels whose centres are within half a side of `centre`.
 fn covered(centre: f64, side: f64, size: usize) -> std::ops::Range<usize> {
     let from = (centre - 0.5 * side).ceil().clamp(0.0, size as f64) as usize;
     let to = ((centre + 0.5 * side).floor() + 1.0).clamp(0.0, size as f64) as usize;

@@ -1,4 +1,4 @@
-//! First pass over a log: its contents. No image is decoded.
+//! First pass over a log: finds its contents. No image is decoded.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read;
@@ -31,15 +31,15 @@ use crate::walk::{Channel, Counters, Message};
 use crate::walker::LogWalker;
 use crate::{Limits, LogError};
 
-/// Maximum number of image stamps kept per topic, to measure rate and skew.
+/// Maximum number of image stamps stored per topic, to measure rate and skew.
 const MAX_STAMPS: usize = 20_000;
 
-/// Message type of a topic, as far as Tagalong uses it.
+/// Message type of a topic, if Tagalong uses it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Type {
     Image,
     CompressedImage,
-    /// Packets of video: of messages of their own, or in place of a compressed image.
+    /// Video packets, either in their own message type or as compressed images.
     Video,
     DisparityImage,
     PointCloud,
@@ -48,14 +48,14 @@ pub(crate) enum Type {
     Odometry,
     /// Messages of an entry in [`crate::sensors::SENSORS`].
     Sensor,
-    /// A number, which may be the unit of a depth camera.
+    /// A number, which may be the depth unit of a camera.
     Number,
     #[default]
     Other,
 }
 
 impl Type {
-    /// Returns the type by its name, with or without its middle part.
+    /// Returns the type by its name, with or without the middle part (`msg`).
     pub(crate) fn of(schema: &str) -> Self {
         let (package, name) = schema.split_once('/').unwrap_or(("", schema));
         match (package, name.rsplit('/').next().unwrap_or(name)) {
@@ -83,7 +83,7 @@ pub(crate) struct Topic {
     pub(crate) encoding: String,
     pub(crate) count: u64,
     pub(crate) undecodable: u64,
-    /// Number of messages with a field that cannot be, and the first such field.
+    /// Number of messages with an impossible field, and the first such field.
     pub(crate) faulty: u64,
     pub(crate) fault: Option<String>,
     pub(crate) first_log_time: u64,
@@ -91,25 +91,26 @@ pub(crate) struct Topic {
     /// `encoding` or `format` of the first image.
     pub(crate) pixels: Option<String>,
     pub(crate) content: Content,
-    /// True for grey images of 16 bits whose encoding leaves open whether they are depth.
+    /// True for grey images of 16 bits whose encoding does not show whether they are depth.
     pub(crate) is_deep_grey: bool,
-    /// True for images with the encoding of depth and a name of another stream: infrared or confidence.
+    /// True for images with the encoding of depth but the name of another stream: infrared or
+    /// confidence.
     pub(crate) is_other_stream: bool,
-    /// True for depth that was compressed as JPEG, which keeps 8 bits.
+    /// True for depth that was compressed as JPEG, which has only 8 bits.
     pub(crate) is_jpeg_depth: bool,
     /// Columns and rows of the first image.
     pub(crate) size: Option<(u32, u32)>,
-    /// Camera of a point cloud in rows and columns, and the reason for which there is none.
+    /// Camera of an organised point cloud, or the reason why there is none.
     pub(crate) cloud: Option<CloudCamera>,
     pub(crate) cloud_fault: Option<String>,
-    /// Reason for which the packets of H.264 so far give no picture.
+    /// Reason why the H.264 packets so far give no picture.
     pub(crate) video_fault: Option<String>,
-    /// True for points that can be read, also if they are not those of a camera.
+    /// True for points that can be read, even if they are not those of a camera.
     pub(crate) has_points: bool,
     pub(crate) frame_id: Option<String>,
-    /// Frame that odometry gives the pose of.
+    /// Frame whose pose the odometry gives.
     pub(crate) child_frame_id: Option<String>,
-    /// Type of images, points or scans that messages of an unknown type contain.
+    /// Type of images, points or scans that are contained in messages of an unknown type.
     pub(crate) part: Option<&'static str>,
     pub(crate) stamps: Vec<Stamp>,
     /// Times at which the messages with these stamps were recorded.
@@ -122,21 +123,21 @@ pub(crate) struct Scan {
     pub(crate) path: PathBuf,
     pub(crate) bytes: u64,
     pub(crate) sha256: String,
-    /// Files of the log; none for a source that is no file.
+    /// Files of the log; empty for a source that is not a file.
     pub(crate) parts: Vec<LogPart>,
     pub(crate) topics: BTreeMap<String, Topic>,
     /// First calibration of each topic that is not blank.
     pub(crate) infos: BTreeMap<String, CameraInfo>,
-    /// Metres per unit of depth, by the topics on which depth cameras say so.
+    /// Metres per unit of depth, by the topics on which depth cameras publish it.
     pub(crate) depth_units: BTreeMap<String, f64>,
-    /// All static transforms, and of the moving ones the frames that they connect.
+    /// All static transforms, and for the moving ones the frames that they connect.
     pub(crate) tf: TfBuffer,
     /// Times of the moving transforms, by the frame that moves.
     pub(crate) link_times: BTreeMap<String, Times>,
     pub(crate) counters: Counters,
     pub(crate) notes: Vec<String>,
     pub(crate) data_lost: bool,
-    /// True if the times of recording stand in place of all stamps.
+    /// True if recording times replace all stamps.
     pub(crate) has_recording_times: bool,
 }
 
@@ -144,17 +145,18 @@ pub(crate) struct Scan {
 #[derive(Clone, Debug)]
 pub(crate) struct LogPart {
     pub(crate) path: PathBuf,
-    /// Ids of channels belong to one file.
+    /// Channels of the file, because their IDs are unique within one file only.
     pub(crate) channels: Vec<Arc<Channel>>,
 }
 
 impl Scan {
-    /// Reads the whole log once; a file a second time if there were messages of channels that became
-    /// known only later.
+    /// Reads the whole log once; a file is read a second time if it had messages of channels whose
+    /// records came later.
     ///
-    /// Chunks are unpacked here and again for the frames: stamps, frames and sizes stand in the messages, of
-    /// which the index of a file has the time of recording alone, a transform may come late, and damage and
-    /// the hash concern every byte. What is unpacked is not kept, because a log may be larger than the memory.
+    /// Chunks are unpacked here and again for the frames: stamps, frames and sizes are in the
+    /// messages, while the index of a file has only recording times; a transform may come late; and
+    /// damage and the hash concern every byte. The unpacked data is not kept, because a log may be
+    /// larger than the memory.
     ///
     /// # Errors
     /// A file that cannot be opened or is not MCAP.
@@ -193,7 +195,7 @@ impl Scan {
             while let Some(message) = walker.next() {
                 gathering.take(&message);
             }
-            // Topics without messages are listed, too.
+            // Topics without messages are listed as well.
             for channel in walker.channels() {
                 gathering.topic(&channel.topic, &channel.schema_name, &channel.encoding);
             }
@@ -204,7 +206,7 @@ impl Scan {
         }
         let sha256 = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
         let Gathering { topics, infos, depth_units, mut tf, link_times, replaced, .. } = gathering;
-        // The frames begin with the first ones, and meet the others on the way.
+        // The frames begin with the first transforms, and find the later ones while reading.
         for first in replaced.values() {
             tf.insert(first, true);
         }
@@ -212,12 +214,12 @@ impl Scan {
         Ok(Self { path, sha256, topics, infos, depth_units, tf, link_times, ..scan })
     }
 
-    /// Adds the walk through one file.
+    /// Adds the results of reading one file.
     fn add_part<R: Read>(&mut self, part: &LogPart, walker: &LogWalker<R>, is_split: bool) {
         let channels = walker.channels().cloned().collect();
         self.parts.push(LogPart { path: part.path.clone(), channels });
         for (name, count) in walker.counters() {
-            // Sums over the files, because the report names one log.
+            // Summed over the files, because the report describes one log.
             *self.counters.entry(name).or_default() += count;
         }
         let file = part.path.file_name().unwrap_or_default().display();
@@ -227,7 +229,7 @@ impl Scan {
         self.data_lost |= walker.data_lost();
     }
 
-    /// Counts a file that does not unpack to its end.
+    /// Counts a file that cannot be unpacked to its end.
     fn add_fault(&mut self, part: &LogPart, fault: Option<String>) {
         let Some(fault) = fault else { return };
         self.data_lost = true;
@@ -236,18 +238,18 @@ impl Scan {
         self.notes.push(format!("{file}: {fault}; what came before is used"));
     }
 
-    /// Counts files that are not there as lost.
+    /// Counts missing files as lost.
     fn without_parts(mut self, missing: &[String]) -> Self {
         if missing.is_empty() {
             return self;
         }
         self.data_lost = true;
         self.counters.insert("missing_files", missing.len() as u64);
-        self.notes.push(format!("not there, and listed in metadata.yaml: {}", missing.join(", ")));
+        self.notes.push(format!("listed in metadata.yaml, but missing: {}", missing.join(", ")));
         self
     }
 
-    /// Returns true for a source that is no file, which may have more topics later.
+    /// Returns true for a source that is not a file, and may have more topics later.
     pub(crate) fn is_live(&self) -> bool {
         self.parts.is_empty()
     }
@@ -257,7 +259,7 @@ impl Scan {
         self.topics.keys().map(String::as_str)
     }
 
-    /// Returns the contents with the times of recording in place of all stamps.
+    /// Returns the contents with recording times in place of all stamps.
     pub(crate) fn with_recording_times(&self) -> Self {
         let mut scan = self.clone();
         scan.has_recording_times = true;
@@ -288,12 +290,12 @@ impl Scan {
     }
 }
 
-/// Returns the files of a log, of whose channels nothing is known yet.
+/// Returns the files of a log, before anything is known of their channels.
 fn unread(files: &LogFiles) -> Vec<LogPart> {
     files.parts().iter().map(|path| LogPart { path: path.clone(), channels: Vec::new() }).collect()
 }
 
-/// Contents that are gathered message by message.
+/// Contents that are collected message by message.
 #[derive(Default)]
 pub(crate) struct Gathering {
     topics: BTreeMap<String, Topic>,
@@ -312,7 +314,7 @@ impl Gathering {
         Self { depth_unit_m, ..Self::default() }
     }
 
-    /// Returns the contents so far of a source that is no file.
+    /// Returns the contents so far of a source that is not a file.
     pub(crate) fn scan(&self, name: &str) -> Scan {
         Scan {
             path: name.into(),
@@ -330,7 +332,7 @@ impl Gathering {
         self.topics.values().any(|topic| topic.pixels.is_some() && topic.cloud_fault.is_none())
     }
 
-    /// Returns a topic; adds it if it is new.
+    /// Returns a topic, and adds it if it is new.
     pub(crate) fn topic(&mut self, name: &str, schema: &str, encoding: &str) -> &mut Topic {
         self.topics.entry(name.to_owned()).or_insert_with(|| Topic {
             kind: if matches!(encoding, "cdr" | "ros1") { Type::of(schema) } else { Type::Other },
@@ -360,7 +362,7 @@ impl Gathering {
             Type::Number => self.take_number(&channel.topic, message.data),
             Type::Tf => self.take_tf(&channel.topic, message.data, message.log_time),
             Type::Other => {
-                // Of an unknown type the definition tells what it contains.
+                // If the type is unknown, the definition shows what it contains.
                 if topic.count == 1 {
                     topic.part = part_of(&channel.definition);
                 }
@@ -377,7 +379,8 @@ impl Gathering {
     }
 
     fn take_info(&mut self, topic: &str, data: &[u8]) -> Option<()> {
-        // Only the first calibration is used; a driver may say nothing until it has one.
+        // Only the first calibration is used, but blank ones are skipped, which a driver may
+        // publish at first.
         if self.infos.get(topic).is_some_and(|known| !is_blank(known)) {
             return Some(());
         }
@@ -387,7 +390,8 @@ impl Gathering {
         Some(())
     }
 
-    /// Takes in a cloud. The first one with enough points tells the camera, and so is its calibration.
+    /// Adds a cloud. The first one with enough points determines the camera, and serves as its
+    /// calibration.
     fn take_cloud(&mut self, name: &str, data: &[u8]) -> Option<()> {
         let topic = self.topic(name, "", "");
         if TopicName::is_own_output(name) {
@@ -421,7 +425,7 @@ impl Gathering {
         Some(())
     }
 
-    /// Takes in the unit of a depth camera, as the recordings of some cameras have it.
+    /// Adds the depth unit of a camera, which the recordings of some cameras contain.
     fn take_number(&mut self, topic: &str, data: &[u8]) -> Option<()> {
         let number: Float32Msg = decode(data).ok()?;
         let unit_m = short(number.data);
@@ -450,7 +454,7 @@ impl Gathering {
         Some(())
     }
 
-    /// Takes in the times of a moving transform.
+    /// Adds the times of a moving transform.
     fn take_times(&mut self, transform: &TransformStamped, recorded: Stamp) {
         let child = plain(&transform.child_frame_id);
         let stamp = transform.header.stamp();
@@ -461,7 +465,7 @@ impl Gathering {
         }
     }
 
-    /// Takes in a static transform, and keeps the one that it replaces if that is the first.
+    /// Adds a static transform, and keeps the one that it replaces if that is the first.
     fn take_static(&mut self, transform: &TransformStamped) {
         let child = &transform.child_frame_id;
         let replaced = self.tf.static_transform(child).filter(|old| {
@@ -475,11 +479,11 @@ impl Gathering {
     }
 }
 
-/// Units of depth that a camera can have, m.
+/// Plausible units of depth cameras, m.
 const DEPTH_UNITS: std::ops::RangeInclusive<f64> = 1e-6..=1.0;
 
-/// Returns the number that the shortest text of a single-precision number stands for: 0.001, and not
-/// 0.0010000000474974513.
+/// Returns the number with the shortest text that gives this single-precision number: 0.001 instead
+/// of 0.0010000000474974513.
 fn short(number: f32) -> f64 {
     number.to_string().parse().unwrap_or_else(|_| f64::from(number))
 }
@@ -490,7 +494,7 @@ pub(crate) fn is_static(tf_topic: &str) -> bool {
 }
 
 impl Topic {
-    /// Returns true if all messages have one stamp and were recorded at different times.
+    /// Returns true if all messages have the same stamp but were recorded at different times.
     pub(crate) fn has_constant_stamps(&self) -> bool {
         let [stamps_same, recorded_same] = [&self.stamps, &self.recorded]
             .map(|stamps| stamps.windows(2).all(|pair| pair[0] == pair[1]));
@@ -513,7 +517,7 @@ impl Topic {
         other_clock_s(of_first_s, own_s, are_apart)
     }
 
-    /// Returns the reason for which no message can be used, although all can be decoded.
+    /// Returns the reason why no message can be used, although all can be decoded.
     pub(crate) fn impossible(&self) -> Option<&str> {
         self.fault.as_deref().filter(|_| self.faulty == self.count)
     }
@@ -523,10 +527,10 @@ impl Topic {
         self.has_points && self.cloud.is_none()
     }
 
-    /// Returns the ranges of its times; `None` without a stamp.
+    /// Returns the ranges of the topic's times; `None` without a stamp.
     pub(crate) fn times(&self) -> Option<Times> {
         let mut times = Times::of(&self.stamps, &self.recorded)?;
-        // Stamps are kept of a number of messages only.
+        // Stamps are stored for a limited number of messages only.
         times.first_recorded = Stamp::from_nanos(self.first_log_time);
         times.last_recorded = Stamp::from_nanos(self.last_log_time);
         Some(times)
@@ -535,7 +539,7 @@ impl Topic {
     fn take_image(&mut self, name: &str, data: &[u8], depth_unit_m: Option<f64>) -> Option<()> {
         let image: Image<'_> = decode(data).ok()?;
         if self.pixels.is_none() {
-            // A unit makes depth of grey images, but not of infrared ones.
+            // A unit turns grey images into depth, but not infrared ones.
             let unit = depth_unit_m.filter(|_| TopicName::of(name).stream != Stream::Other);
             self.content = content_of_encoding(&image.encoding, unit);
             self.is_deep_grey = image.encoding == "mono16";
@@ -559,22 +563,22 @@ impl Topic {
             let declared = content_of_compressed(&image);
             self.is_deep_grey = codec == Codec::DeepPng && declared != Content::Depth;
             let is_named_depth = TopicName::of(name).stream == Stream::Depth;
-            // Three channels may be depth that was coloured for people to look at.
+            // Three channels may be depth that was coloured for display.
             self.is_jpeg_depth = codec.is_jpeg()
                 && (declared == Content::Depth || codec == Codec::GreyJpeg && is_named_depth);
             self.content = match declared {
                 _ if self.is_jpeg_depth => Content::Unknown,
                 _ if self.is_deep_grey && is_named_depth => Content::Depth,
-                // Not a picture, because the decoder makes depth of it.
+                // Not a picture, because the decoder turns it into depth.
                 _ if self.is_deep_grey => Content::Unknown,
-                // The format is any text, and the codec is told by the first bytes.
+                // The format is free text, so the codec is recognised by the first bytes.
                 Content::Unknown if codec != Codec::Unknown => Content::Picture,
                 content => content,
             };
             self.doubt_depth(name);
             self.pixels = Some(image.format);
         }
-        // Video under any label.
+        // Video is recognised under any format name.
         if let Some(codec) = video_codec(image.data) {
             self.kind = Type::Video;
             self.take_packet(codec, image.data);
@@ -583,8 +587,8 @@ impl Topic {
         Some(())
     }
 
-    /// Takes images with the encoding of depth for none if their name says infrared or confidence,
-    /// which have 16 bits or floating-point numbers, too.
+    /// Excludes images with the encoding of depth whose name says infrared or confidence, because
+    /// those also have 16 bits or floating-point numbers.
     fn doubt_depth(&mut self, name: &str) {
         if self.content == Content::Depth && TopicName::of(name).stream == Stream::Other {
             self.content = Content::Unknown;
@@ -600,7 +604,7 @@ impl Topic {
         Some(())
     }
 
-    /// Takes in a packet of video: the first parameters tell the size of the pictures.
+    /// Adds a video packet: the first parameters give the size of the pictures.
     fn take_packet(&mut self, codec: &str, data: &[u8]) {
         if codec != H264 {
             (self.content, self.pixels) = (Content::Unknown, Some(codec.to_owned()));
@@ -613,12 +617,12 @@ impl Topic {
                     self.video_fault = Some(NO_PARAMETERS.to_owned());
                 }
                 Ok(size) => self.size = size,
-                // Of damaged parameters others may follow.
+                // After damaged parameters, intact ones may follow.
                 Err(ImageError::Codec(_)) => {}
                 Err(error) => self.video_fault = Some(error.to_string()),
             }
         }
-        // Without its parameters there is no picture.
+        // Without its parameters no picture can be decoded.
         self.content = if self.size.is_some() { Content::Picture } else { Content::Unknown };
     }
 
@@ -635,8 +639,9 @@ impl Topic {
         Some(())
     }
 
-    /// Takes in the camera of a cloud; returns true if it can be used. Points with x ahead are those of a camera only where the frame is
-    /// called optical all the same, as by a simulator; elsewhere the frame is not that of its images.
+    /// Adds the camera of a cloud; returns true if it can be used. Points with x forward are those
+    /// of a camera only if the frame is nevertheless called optical, as in a simulator; otherwise
+    /// the frame is not that of its images.
     fn take_camera(&mut self, camera: CloudCamera, frame: &str) -> bool {
         let is_usable = camera.axes == CloudAxes::Optical || frame.contains("optical");
         self.cloud = Some(camera);
@@ -645,8 +650,8 @@ impl Topic {
             self.cloud_fault = None;
         } else {
             self.cloud_fault = Some(format!(
-                "its points have x ahead (frame `{frame}`), and those of an optical frame, with z \
-                 ahead, are read: record the depth images of that camera"
+                "its points have x ahead (frame `{frame}`), but only those of an optical frame, \
+                 with z ahead, can be read: record the depth images of that camera"
             ));
         }
         is_usable
@@ -678,7 +683,7 @@ impl Topic {
     }
 }
 
-/// Returns the name of the calibration that the points of a cloud tell.
+/// Returns the name of the calibration that is derived from the points of a cloud.
 pub(crate) fn calibration_by_points(topic: &str) -> String {
     format!("{topic} (by its points)")
 }

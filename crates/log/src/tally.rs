@@ -1,20 +1,20 @@
 use std::collections::BTreeMap;
 
-/// Losses, skipped data and remarks, by name and in sentences.
+/// Losses, skipped data and remarks, counted by name and described in sentences.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tally {
     pub(crate) counters: BTreeMap<&'static str, u64>,
     pub(crate) notes: Vec<String>,
     pub(crate) lost: bool,
-    /// Description of the first loss. Others may follow from it.
+    /// Description of the first loss, from which later ones may follow.
     pub(crate) first_loss: Option<String>,
 }
 
-/// Maximum number of sentences kept; repeated ones are only counted.
+/// Maximum number of stored sentences; repeated ones are only counted.
 const MAX_NOTES: usize = 40;
 
 impl Tally {
-    /// Counts an event that is no loss.
+    /// Counts an event that is not a loss.
     pub(crate) fn count(&mut self, name: &'static str) {
         self.add(name, 1);
     }
@@ -37,13 +37,13 @@ impl Tally {
         }
     }
 
-    /// Describes lost data that are counted already.
+    /// Describes lost data that is already counted.
     pub(crate) fn lose_counted(&mut self, what: String) {
         self.lost = true;
         self.note(what);
     }
 
-    /// Counts an event that is no loss, and describes it once per name.
+    /// Counts an event that is not a loss, and describes it once per name.
     pub(crate) fn remark(&mut self, name: &'static str, what: impl FnOnce() -> String) {
         self.count(name);
         if self.counters.get(name) == Some(&1) {

@@ -1,4 +1,4 @@
-//! Relative poses of frames over time.
+//! Relative poses of frames over time, as in tf2.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -10,9 +10,9 @@ use crate::odometry::{AHEAD_S, age_between};
 
 /// Maximum time between a sample of a moving transform and a query, s.
 const REACH_S: f64 = 0.5;
-/// Time for which moving transforms are kept, s.
+/// Time for which samples of moving transforms are stored, s.
 const KEPT_S: f64 = 15.0;
-/// Maximum number of samples kept of one moving transform.
+/// Maximum number of stored samples of one moving transform.
 const MAX_SAMPLES: usize = 8192;
 /// Maximum number of frames; a log with more is broken.
 const MAX_FRAMES: usize = 4096;
@@ -30,7 +30,7 @@ pub(crate) struct Link {
     fixed: Option<Isometry3<f64>>,
 }
 
-/// All transforms known at present. A static transform holds at all times.
+/// All transforms that are known at present. A static transform is valid at all times.
 #[derive(Clone, Debug, Default)]
 pub struct TfBuffer {
     links: BTreeMap<String, Link>,
@@ -43,7 +43,7 @@ pub(crate) fn plain(name: &str) -> &str {
 
 impl TfBuffer {
     /// Adds a transform; returns false if it is invalid (a number that is not finite, a quaternion
-    /// that is no rotation, a frame that is its own parent) or there are too many frames.
+    /// that is no rotation, a frame that is its own parent) or if there are too many frames.
     pub fn insert(&mut self, transform: &TransformStamped, is_static: bool) -> bool {
         let child = plain(&transform.child_frame_id);
         let parent = plain(&transform.header.frame_id);
@@ -70,7 +70,7 @@ impl TfBuffer {
         true
     }
 
-    /// Returns the static transform of a frame, without its time.
+    /// Returns the static transform of a frame, with its time left out.
     pub(crate) fn static_transform(&self, child: &str) -> Option<TransformStamped> {
         let link = self.links.get(plain(child))?;
         Some(TransformStamped {
@@ -86,7 +86,7 @@ impl TfBuffer {
         (child.to_owned(), self.links.get(child).cloned())
     }
 
-    /// Returns to a link that was saved, or to none.
+    /// Restores a link that was saved, or removes it if there was none.
     pub(crate) fn restore(&mut self, (child, link): (String, Option<Link>)) {
         match link {
             Some(link) => self.links.insert(child, link),
@@ -115,12 +115,12 @@ impl TfBuffer {
         self.links.contains_key(plain(frame))
     }
 
-    /// Returns the topmost frame above one; the frame itself if it has no parent.
+    /// Returns the topmost ancestor of a frame; the frame itself if it has no parent.
     pub(crate) fn root_of<'a>(&'a self, frame: &'a str) -> &'a str {
         self.ancestors(plain(frame)).last().copied().unwrap_or(frame)
     }
 
-    /// Returns true if the two frames are connected, at any time.
+    /// Returns true if the two frames are connected at any time.
     pub fn connects(&self, a: &str, b: &str) -> bool {
         let up_a = self.ancestors(plain(a));
         let up_b = self.ancestors(plain(b));
@@ -129,7 +129,7 @@ impl TfBuffer {
 
     /// Returns the pose of frame `source` in frame `target` at a given time: it maps coordinates in
     /// `source` to coordinates in `target`. Moving transforms are interpolated, and held for half a
-    /// second before their first and behind their last sample. `None` if the frames are not
+    /// second before their first and after their last sample. `None` if the frames are not
     /// connected or a transform is not known at that time.
     pub fn lookup(&self, target: &str, source: &str, at: Stamp) -> Option<Isometry3<f64>> {
         let up_t = self.ancestors(plain(target));
@@ -140,24 +140,24 @@ impl TfBuffer {
         Some(target.inverse() * source)
     }
 
-    /// Returns the age of the pose of frame `source` in frame `target` at a given time, s: that of the
-    /// oldest moving transform between them, by [`age_between`]. Infinite if the frames are not
-    /// connected, or by static transforms alone, which are no readings.
+    /// Returns the age of the pose of frame `source` in frame `target` at a given time, s: that of
+    /// the oldest moving transform between them, by [`age_between`]. It is infinite if the frames
+    /// are not connected, or only by static transforms, which are not readings.
     pub(crate) fn age_s(&self, target: &str, source: &str, at: Stamp) -> f64 {
         let ages = self.moving_between(target, source).filter_map(|link| link.age_s(at));
         ages.reduce(f64::max).unwrap_or(f64::INFINITY)
     }
 
-    /// Returns the time from a frame to the next sample of a moving transform, s, if it is too late
-    /// to be one of that frame.
+    /// Returns the time until the next sample of a moving transform, s, if that is too late to
+    /// belong to the given time.
     pub(crate) fn ahead_s(&self, target: &str, source: &str, at: Stamp) -> Option<f64> {
         let ahead = self.moving_between(target, source).filter_map(|link| link.around(at).1);
         let ahead_s = ahead.map(|sample| sample.0.seconds_since(at)).reduce(f64::max)?;
         (ahead_s > AHEAD_S).then_some(ahead_s)
     }
 
-    /// Returns the frames between two others that move in their parent and have no static transform
-    /// beside that, with the parent.
+    /// Returns the frames between two others that move relative to their parent and have no static
+    /// transform as well, with the parent.
     pub(crate) fn moving_frames<'a>(
         &'a self,
         target: &'a str,
@@ -174,7 +174,7 @@ impl TfBuffer {
         found
     }
 
-    /// Yields the links between two frames; nothing if they are not connected.
+    /// Yields the links between two frames; none if they are not connected.
     fn moving_between<'a>(
         &'a self,
         target: &'a str,
@@ -183,7 +183,7 @@ impl TfBuffer {
         self.frames_between(target, source).filter_map(|frame| self.links.get(frame))
     }
 
-    /// Yields the frames from two frames up to their common one, without it.
+    /// Yields the frames from two frames up to their common ancestor, without that one.
     fn frames_between<'a>(
         &'a self,
         target: &'a str,
@@ -198,8 +198,8 @@ impl TfBuffer {
             .flat_map(|(up, common)| up.into_iter().take_while(move |frame| *frame != common))
     }
 
-    /// Returns the pose of frame `source` in frame `target` by the static transforms between them
-    /// alone, as if those that only move were none; `None` if the frames are not connected.
+    /// Returns the pose of frame `source` in frame `target` from static transforms only, with
+    /// moving transforms taken as the identity; `None` if the frames are not connected.
     pub(crate) fn static_pose(&self, target: &str, source: &str) -> Option<Isometry3<f64>> {
         let up_t = self.ancestors(plain(target));
         let up_s = self.ancestors(plain(source));
@@ -212,11 +212,11 @@ impl TfBuffer {
         Some(target.inverse() * source)
     }
 
-    /// Returns the frame, its parent, and so on; ends at a loop.
+    /// Returns the frame, its parent, and so on; stops at a loop.
     fn ancestors<'a>(&'a self, frame: &'a str) -> Vec<&'a str> {
         let mut out = vec![frame];
         while let Some(link) = out.last().and_then(|last| self.links.get(*last)) {
-            // A loop of parents would never end.
+            // Without this check a loop of parents would never end.
             if out.len() > MAX_DEPTH || out.contains(&link.parent.as_str()) {
                 break;
             }
@@ -279,17 +279,17 @@ impl Link {
             }
             (None, None) => None,
         };
-        // A link may be on both topics; the static one serves without a sample.
+        // A link may be on both topics; the static one is used if there is no sample.
         moving.or(self.fixed)
     }
 }
 
-/// Interpolates linearly in position and at constant speed in rotation.
+/// Interpolates linearly in position, and with constant angular velocity in rotation.
 fn interpolate((t0, a): &Sample, (t1, b): &Sample, at: Stamp) -> Isometry3<f64> {
     let span = t1.seconds_since(*t0);
     let part = if span > 0.0 { at.seconds_since(*t0) / span } else { 0.0 };
     let translation = a.translation.vector.lerp(&b.translation.vector, part);
-    // Between nearly equal rotations the length of the result is not exactly one.
+    // Between nearly equal rotations the norm of the result is not exactly one.
     let mut rotation = a.rotation.try_slerp(&b.rotation, part, 1e-9).unwrap_or(a.rotation);
     rotation.renormalize();
     Isometry3::from_parts(translation.into(), rotation)

@@ -1,4 +1,4 @@
-//! Regularity of images, and offsets between those of two topics, by their stamps.
+//! Regularity of images, and time offsets between those of two topics, from their stamps.
 
 use serde::Serialize;
 use tagalong_core::Stamp;
@@ -8,13 +8,13 @@ use tagalong_math::median;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Timing {
-    /// Median of the steps forward, s.
+    /// Median of the forward steps, s.
     pub median_period_s: f64,
-    /// Longest step forward, s.
+    /// Longest forward step, s.
     pub longest_gap_s: f64,
-    /// Number of steps back.
+    /// Number of backward steps.
     pub steps_back: usize,
-    /// Longest step back, s.
+    /// Longest backward step, s.
     pub longest_step_back_s: f64,
     /// Number of stamps equal to the previous one.
     pub repeated: usize,
@@ -41,7 +41,8 @@ impl Timing {
 pub struct Skew {
     /// Median of second minus first over neighbouring images, s.
     pub median_s: f64,
-    /// Fraction of the first topic's images with a second one within the tolerance.
+    /// Fraction of the first topic's images that have an image of the second topic within the
+    /// tolerance.
     pub paired: f64,
     /// Time by which the second topic's stamps are later than those of the first, s, if the recording
     /// times show that the two have different clocks.
@@ -73,8 +74,8 @@ impl Skew {
 pub(crate) fn clock_words(off_s: f64, others: &str) -> String {
     let side = if off_s > 0.0 { "later" } else { "earlier" };
     format!(
-        "its stamps are {:.2} s {side} than those of the {others}, judged by the recording times: another \
-         clock",
+        "compared by the times of recording, its stamps are {:.2} s {side} than those of the {others}: \
+         another clock",
         off_s.abs()
     )
 }

@@ -2,9 +2,9 @@
 //!
 //! The channel [`crate::TRUTH_TOPIC`] carries one JSON text per image, with the image's stamp (see
 //! [`TruthFrame`]). JSON is used because no ROS message has a field for "hidden and does not
-//! count", and because it can be read in any viewer. It is written as a `std_msgs/String`, because
-//! some readers of ROS 2 logs refuse a file with any other kind of schema. A plain JSON message can
-//! be read, too (message encoding `json`, schema encoding `jsonschema`, schema name
+//! count", and because any viewer can show it. It is written as a `std_msgs/String`, because some
+//! readers of ROS 2 logs reject a file with any other kind of schema. A plain JSON message can be
+//! read as well (message encoding `json`, schema encoding `jsonschema`, schema name
 //! [`TRUTH_SCHEMA`]).
 
 use std::collections::BTreeMap;
@@ -19,7 +19,7 @@ use crate::msgs::{StringMsg, decode};
 use crate::walker::LogWalker;
 use crate::{Limits, LogError};
 
-/// Name of its schema in plain JSON.
+/// Name of the schema in plain JSON.
 pub const TRUTH_SCHEMA: &str = "tagalong/TruthFrame";
 
 /// All people at the time of one image.
@@ -28,15 +28,15 @@ pub const TRUTH_SCHEMA: &str = "tagalong/TruthFrame";
 pub struct TruthFrame {
     /// Stamp of the image, ns.
     pub stamp_ns: u64,
-    /// All people, those that do not count included.
+    /// All people, including those that do not count.
     pub people: Vec<TruthPerson>,
 }
 
-/// One person at one time.
+/// One person at one moment.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TruthPerson {
-    /// Identity, the same throughout the log.
+    /// ID, the same throughout the log.
     pub id: i64,
     /// Centre of the head in the robot frame (X forward, Y left, Z up), m.
     pub head_in_robot_m: Option<[f64; 3]>,
@@ -44,22 +44,22 @@ pub struct TruthPerson {
     /// it lies in the unwrapped panorama, and may continue beyond the right edge (see
     /// `tagalong_geometry::Panorama`).
     pub upper_body_px: Option<[f64; 4]>,
-    /// Visible part of it, likewise.
+    /// Visible part of the upper body, likewise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub visible_px: Option<[f64; 4]>,
-    /// Middle of the trunk in the robot frame, m.
+    /// Centre of the trunk in the robot frame, m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub torso_in_robot_m: Option<[f64; 3]>,
-    /// Identity of the person that hides most of the hidden part of the upper body.
+    /// ID of the person that hides most of the hidden part of the upper body.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub occluder: Option<i64>,
     /// Visible fraction of the upper body, 0 to 1.
     #[serde(default = "whole")]
     pub visible: f64,
-    /// True if the person counts neither as a miss nor as a false alarm.
+    /// True if the person counts neither as a miss nor as a false positive.
     #[serde(default)]
     pub ignore: bool,
-    /// Joints by their names in the keypoints of COCO (`left_shoulder`), as far as they are known.
+    /// Joints by their names in the keypoints of COCO (`left_shoulder`), if they are known.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub joints: BTreeMap<String, TruthJoint>,
 }
@@ -68,12 +68,12 @@ pub struct TruthPerson {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TruthJoint {
-    /// In the robot frame (X forward, Y left, Z up), m.
+    /// Position in the robot frame (X forward, Y left, Z up), m.
     pub in_robot_m: [f64; 3],
-    /// Column and row in the image, pixels; nothing outside of it.
+    /// Column and row in the image, pixels; absent outside of it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub px: Option<[f64; 2]>,
-    /// True if nothing stands before it.
+    /// True if nothing hides the joint.
     #[serde(default)]
     pub in_sight: bool,
 }
@@ -89,11 +89,11 @@ impl TruthFrame {
     }
 }
 
-/// Reads the truth of a log in the order of the stamps; `None` if the log has no such channel.
+/// Reads the truth of a log, sorted by stamp; `None` if the log has no such channel.
 ///
 /// # Errors
-/// A log that cannot be opened, or a message of the channel that is no [`TruthFrame`], because an
-/// incomplete truth would give wrong figures.
+/// A log that cannot be opened, or a message of the channel that is not a [`TruthFrame`], because
+/// an incomplete truth would give wrong figures.
 pub fn read_truth(path: &Path, limits: &Limits) -> Result<Option<Vec<TruthFrame>>, LogError> {
     let mut frames = Vec::new();
     let mut present = false;
@@ -116,10 +116,10 @@ pub fn read_truth(path: &Path, limits: &Limits) -> Result<Option<Vec<TruthFrame>
     Ok(present.then_some(frames))
 }
 
-/// Reads truth from a text with one [`TruthFrame`] per line, in the order of the stamps.
+/// Reads truth from a text with one [`TruthFrame`] per line, sorted by stamp.
 ///
 /// # Errors
-/// A file that cannot be read, or a line that is no [`TruthFrame`].
+/// A file that cannot be read, or a line that is not a [`TruthFrame`].
 pub fn read_truth_lines(path: &Path) -> Result<Vec<TruthFrame>, LogError> {
     let mut text = String::new();
     let read = open_file(path)?.read_to_string(&mut text);
@@ -133,7 +133,7 @@ pub fn read_truth_lines(path: &Path) -> Result<Vec<TruthFrame>, LogError> {
     Ok(frames)
 }
 
-/// The error on a line of a truth file, counted from 1.
+/// Returns the error for a line of a truth file, counted from 1.
 fn wrong_line(path: &Path, number: usize, why: &dyn std::fmt::Display) -> LogError {
     LogError::Truth { path: path.to_owned(), number, why: why.to_string() }
 }

@@ -10,15 +10,15 @@ use crate::packed::LogFile;
 use crate::walk::{Channel, Counters, LOSSES, Message, Source, Walk};
 use crate::{Limits, LogError};
 
-/// Robust reader of an MCAP file, of a ROS 1 bag or of a rosbag2 database, which trusts nothing in
-/// it. The container is told apart by its first bytes.
+/// Robust reader of an MCAP file, a ROS 1 bag or a rosbag2 database, which trusts none of their
+/// contents. The container is recognised by its first bytes.
 ///
 /// The file is read once from front to back through a small buffer, so that a pipe of any length
 /// can be read, and a file that shrinks meanwhile is only a truncated file. The index at its end is
-/// never needed, hence a file without it (because its writer was killed) is read like any other, up
-/// to its last complete chunk. Sizes are bounded by [`Limits`]. A part that cannot be used is
-/// counted and the walk goes on behind it; a part without an end (a record longer than the rest of
-/// the file) ends the walk. Once ended, it stays ended.
+/// never needed, so a file without it (because its writer was killed) is read like any other, up to
+/// its last complete chunk. Sizes are bounded by [`Limits`]. A part that cannot be used is counted,
+/// and reading continues behind it; a part without an end (a record longer than the rest of the
+/// file) ends the walk. Once ended, it stays ended.
 pub struct LogWalker<R> {
     walk: Walk<R>,
     container: Container,
@@ -31,7 +31,7 @@ enum Container {
     Database(Box<Database>),
 }
 
-/// Returns true if the file begins with a long magic, whose first bytes have been read.
+/// Returns true if the file begins with these magic bytes, of which the first have been read.
 fn begins<R: Read>(source: &mut Source<R>, first: &[u8], magic: &[u8]) -> bool {
     let mut rest = vec![0; magic.len() - 8];
     first == &magic[..8] && {
@@ -44,8 +44,8 @@ impl LogWalker<LogFile> {
     /// Opens a file of a log, compressed or not.
     ///
     /// # Errors
-    /// [`LogError`] for a file that cannot be opened, is no regular file or starts as no container
-    /// does.
+    /// [`LogError`] for a file that cannot be opened, is not a regular file or does not start like
+    /// a container.
     pub fn open(path: &Path, limits: &Limits) -> Result<Self, LogError> {
         let file = LogFile::open(path, limits)?;
         let contents = file.path().to_owned();
@@ -58,16 +58,16 @@ impl<R: Read> LogWalker<R> {
     /// Starts a walk.
     ///
     /// # Errors
-    /// [`NotMcap`] if the file starts as neither container does.
+    /// [`NotMcap`] if the file starts like neither container.
     pub fn new(reader: R, limits: &Limits) -> Result<Self, NotMcap> {
         Self::begin(None, reader, limits)
     }
 
-    /// Starts a walk through a file of this path. A database is read by its path, front to back
-    /// by the number of each message; of `reader` no more than the first bytes are read then.
+    /// Starts a walk through a file at this path. A database is read by its path, front to back in
+    /// the order of message IDs; then only the first bytes of `reader` are read.
     ///
     /// # Errors
-    /// [`NotMcap`] if the file starts as no container does, or is another database.
+    /// [`NotMcap`] if the file does not start like a container, or is another database.
     pub fn at(path: &Path, reader: R, limits: &Limits) -> Result<Self, NotMcap> {
         Self::begin(Some(path), reader, limits)
     }
@@ -93,7 +93,7 @@ impl<R: Read> LogWalker<R> {
     }
 
     /// Adds the channels of an earlier walk through the same file. The index of an MCAP file
-    /// repeats them at its end, which helps where the chunk with their first record is damaged.
+    /// repeats them at its end, which helps if the chunk with their first record is damaged.
     #[must_use]
     pub fn knowing(mut self, channels: impl IntoIterator<Item = Arc<Channel>>) -> Self {
         self.walk.channels.extend(channels.into_iter().map(|channel| (channel.id, channel)));
@@ -107,7 +107,7 @@ impl<R: Read> LogWalker<R> {
         self.message()
     }
 
-    /// Goes on to the next message; returns false at the end.
+    /// Advances to the next message; returns false at the end.
     pub(crate) fn advance(&mut self) -> bool {
         let Self { walk, container } = self;
         walk.located = None;

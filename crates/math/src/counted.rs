@@ -1,6 +1,6 @@
 /// Returns a number with its noun: "1 frame", "2 frames". The plural of the noun ends in `s`.
 pub fn counted(count: impl TryInto<u64>, noun: &str) -> String {
-    // A number that no u64 holds is certainly not one.
+    // A number too large for u64 is not 1, so it takes the plural.
     let count = count.try_into().unwrap_or(u64::MAX);
     let ending = if count == 1 { "" } else { "s" };
     format!("{count} {noun}{ending}")

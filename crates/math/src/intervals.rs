@@ -1,23 +1,23 @@
-//! Intervals: how far a figure can be trusted.
+//! Confidence intervals of figures.
 
 use serde::{Deserialize, Deserializer, Serialize};
 use statrs::distribution::{Beta, ContinuousCDF, StudentsT};
 use statrs::function::erf::erf_inv;
 
-/// Confidence of all intervals.
+/// Confidence level of all intervals.
 pub const CONFIDENCE: f64 = 0.95;
 
-/// Halvings of an interval from 0 to 1 that leave a part of it of 1e-18.
+/// Bisections of the interval from 0 to 1, which leave a width of 1e-18.
 const HALVINGS: u32 = 60;
-/// Draws that differ by less than this part of the figure do not differ.
+/// Draws whose values differ by less than this fraction of the figure count as equal.
 const ROUNDING: f64 = 1e-9;
 
-/// A figure and the interval in which it lies with some confidence. A single draw, and draws that
-/// all have the same value, contain no information about the spread: such an interval has no ends
-/// (minus and plus infinity; `null` in JSON).
+/// An estimate with its confidence interval. A single draw, and draws that all have the same value,
+/// contain no information about the spread: the interval then has no ends (minus and plus infinity;
+/// `null` in JSON).
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Interval {
-    /// The figure itself.
+    /// Point estimate.
     pub estimate: f64,
     /// Lower end.
     #[serde(deserialize_with = "open_below")]
@@ -28,7 +28,7 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// Returns a figure of which nothing more is known.
+    /// Returns an estimate with an interval without ends.
     pub const fn open(estimate: f64) -> Self {
         Self { estimate, lower: f64::NEG_INFINITY, upper: f64::INFINITY }
     }
@@ -38,8 +38,7 @@ impl Interval {
         (self.lower.is_finite() && self.upper.is_finite()).then_some([self.lower, self.upper])
     }
 
-    /// Returns the part of the interval that a figure of this range can have; one
-    /// without ends stays so.
+    /// Returns the interval cut to the range of possible values; one without ends is left as it is.
     ///
     /// ```
     /// let interval = tagalong_math::mean_interval(&[0.9, 1.0, 1.0]).unwrap();
@@ -71,11 +70,11 @@ fn open_above<'de, D: Deserializer<'de>>(end: D) -> Result<f64, D::Error> {
     Ok(Option::deserialize(end)?.unwrap_or(f64::INFINITY))
 }
 
-/// The Wilson score interval of a success rate (Wilson, JASA 1927): sensible
-/// for few trials and for rates of 0 and 1. Nothing without trials. The trials
-/// have to be independent; [`clustered_share`] is for those that are not.
+/// Returns the Wilson score interval of a success rate (Wilson, JASA 1927), which also holds for
+/// few trials and for rates of 0 and 1. `None` without trials. The trials have to be independent;
+/// [`clustered_share`] is for those that are not.
 ///
-/// `confidence` lies between 0 and 1, both excluded, for example 0.95.
+/// `confidence` lies between 0 and 1, exclusive, for example 0.95.
 ///
 /// ```
 /// let rate = tagalong_math::wilson(10, 10, 0.95).unwrap();
@@ -88,8 +87,8 @@ pub fn wilson(successes: u64, trials: u64, confidence: f64) -> Option<Interval> 
 }
 
 /// Returns the exact upper bound of a rate (Clopper and Pearson, Biometrika 1934): at any higher
-/// rate so few events, or fewer, have a probability below `1 - confidence`. One-sided: for rare
-/// events, like contacts, of which only the upper end matters. `None` without trials.
+/// rate, so few events or fewer have a probability below `1 - confidence`. It is one-sided, for
+/// rare events such as contacts, where only the upper end matters. `None` without trials.
 ///
 /// ```
 /// let bound = tagalong_math::exact_upper_bound(0, 3000, 0.95).unwrap();
@@ -103,7 +102,8 @@ pub fn exact_upper_bound(events: u64, trials: u64, confidence: f64) -> Option<f6
         return Some(1.0);
     }
     let law = Beta::new(events as f64 + 1.0, (trials - events) as f64).ok()?;
-    // The inverse of the library is not exact for a million trials; its distribution is.
+    // The library's inverse is inexact for a million trials, but its distribution function is
+    // exact.
     let [mut low, mut high] = [0.0, 1.0];
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);
@@ -129,26 +129,27 @@ fn score_interval(estimate: f64, trials: f64, confidence: f64) -> Interval {
     }
 }
 
-/// Returns the number of standard errors on either side with so much confidence.
+/// Returns the two-sided quantile of the normal distribution, in standard errors.
 fn normal_quantile(confidence: f64) -> f64 {
     std::f64::consts::SQRT_2 * erf_inv(confidence)
 }
 
-/// As [`normal_quantile`], where the error is itself estimated from a few draws.
+/// Returns the same quantile of Student's distribution, for a standard error that is itself
+/// estimated from a few draws.
 fn student_quantile(freedom: usize) -> f64 {
     let law = StudentsT::new(0.0, 1.0, freedom as f64);
     law.map_or(f64::INFINITY, |law| law.inverse_cdf(0.5 + 0.5 * CONFIDENCE))
 }
 
-/// Returns the interval of a success rate whose trials come in clusters, each `[successes,
-/// trials]`: the frames of a ride resemble each other, and a hundred of them say less
-/// than a hundred rides. The Wilson interval of as many independent trials as have the
-/// spread that the clusters show (never more than there are), with Student's quantile
-/// of the clusters (Korn and Graubard, Survey Methodology 1998; Dean and Pagano, J. of
-/// Survey Statistics and Methodology 2015). Where all succeed, or none, clusters show
-/// no spread, and each counts as one trial.
+/// Returns the interval of a success rate whose trials come in clusters, each
+/// `[successes, trials]`. The frames of a ride resemble each other, so a hundred frames contain
+/// less information than a hundred rides. The interval is Wilson's for the number of independent
+/// trials that would have the spread seen between the clusters (never more than the actual number),
+/// with Student's quantile for the number of clusters (Korn and Graubard, Survey Methodology 1998;
+/// Dean and Pagano, J. of Survey Statistics and Methodology 2015). If all trials succeed, or none,
+/// the clusters show no spread, and each counts as one trial.
 ///
-/// Nothing without trials; an interval without ends from one cluster of several.
+/// `None` without trials. With a single cluster of several trials the interval has no ends.
 ///
 /// ```
 /// use tagalong_math::{clustered_share, wilson};
@@ -187,21 +188,22 @@ fn independent_trials(clusters: &[[u64; 2]], rate: f64, trials: f64) -> f64 {
     alike * (normal_quantile(CONFIDENCE) / student_quantile(clusters.len() - 1)).powi(2)
 }
 
-/// Returns the interval of a figure that is computed from `draws` draws (or logs, rides, blocks:
+/// Returns the interval of a figure that is computed from `draws` draws (or logs, rides, blocks;
 /// not frames, because frames of one recording are not independent). `figure` is called with the
-/// indices of those that enter: first of all, then of all but one. The changes from leaving one out
-/// give the spread (the jackknife: Tukey, Ann. Math. Stat. 1958), and Student's quantile allows for
-/// its own uncertainty with few draws. Of a mean this is Student's interval.
+/// indices of the draws to use: first with all of them, then with all but one. The changes from
+/// leaving one out give the spread (the jackknife: Tukey, Ann. Math. Stat. 1958), and Student's
+/// quantile allows for the uncertainty of that spread with few draws. For a mean this is Student's
+/// interval.
 ///
-/// Simulated, its 95 % cover 95 % of normal and of symmetric bounded differences from 3 draws on;
-/// of exponential ones 88 % with 3 to 6 draws and 92 % with 20. A percentile bootstrap covers 75 %
-/// of normal ones with 3 draws, and a studentised one has ends without bounds there. Losses so rare
-/// that most handfuls of draws have none are beyond all of them.
+/// In simulations, its 95 % interval covers 95 % of normal and of symmetric bounded differences
+/// from 3 draws on; of exponential ones 88 % with 3 to 6 draws and 92 % with 20. A percentile
+/// bootstrap covers 75 % of normal ones with 3 draws, and a studentised one can there be unbounded.
+/// None of them allows for losses so rare that most small samples contain none.
 ///
-/// `None` without draws or a finite figure; an interval without ends from one draw, and from draws
-/// that say the same.
+/// `None` without draws or without a finite figure; the interval has no ends with one draw, or with
+/// draws of the same value.
 ///
-/// For a figure of all draws together combine their own tallies:
+/// For a figure of all draws together, combine the counts of the draws:
 ///
 /// ```
 /// use tagalong_math::draws_interval;
@@ -236,7 +238,7 @@ pub fn draws_interval(draws: usize, figure: impl Fn(&[usize]) -> f64) -> Option<
     Some(Interval::around(estimate, student_quantile(draws - 1) * error))
 }
 
-/// Returns the interval of the mean of one value a draw; as [`draws_interval`].
+/// Returns the interval of the mean of one value per draw; see [`draws_interval`].
 pub fn mean_interval(values: &[f64]) -> Option<Interval> {
     draws_interval(values.len(), |drawn| {
         drawn.iter().map(|&i| values[i]).sum::<f64>() / drawn.len() as f64

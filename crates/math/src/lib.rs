@@ -2,18 +2,18 @@
 //!
 //! * [`SplitMix64`], [`ChaCha`], [`XorShift64`]: seeded generators with the same numbers on every
 //!   machine; [`RandomSource`] has the distributions. [`mix`] and [`number_at`] turn keys into
-//!   numbers without a state, for threads that work in any order; [`fingerprint`] turns bytes into
-//!   one.
+//!   random numbers without a state, for threads that work in any order; [`fingerprint`] hashes
+//!   bytes.
 //! * [`mean`], [`mean_and_deviation`], [`median`], [`percentile`]: summaries of values.
-//! * [`mean_interval`], [`draws_interval`], [`wilson`], [`clustered_share`],
-//!   [`exact_upper_bound`]: how far a figure can be trusted; [`paired_gain`], [`sign_flip`],
-//!   [`holm`], [`draws_needed`]: how far a difference can.
+//! * [`mean_interval`], [`draws_interval`], [`wilson`], [`clustered_share`], [`exact_upper_bound`]:
+//!   confidence intervals; [`paired_gain`], [`sign_flip`], [`holm`], [`draws_needed`]: significance
+//!   of differences.
 //! * [`matching`]: the assignment of rows to columns with the greatest weight, for metrics and for
 //!   associators.
-//! * [`exp2_of_negative`]: an exponential function for loops over many numbers.
-//! * [`counted`]: a number with its noun, for everything that is printed.
+//! * [`exp2_of_negative`]: a fast exponential function for loops over many numbers.
+//! * [`counted`]: a number with its noun, for printed text.
 //!
-//! There is no clock and no global generator: the same seed gives the same bytes.
+//! There is no clock and no global generator, so the same seed gives the same bytes.
 
 mod counted;
 mod intervals;

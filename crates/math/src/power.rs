@@ -1,6 +1,6 @@
-/// Returns 2 to the power of a number that is not positive, to 2e-15 of it; below -1000 it counts
-/// as -1000. Without branches and without fused arithmetic, so that loops over it become vector
-/// instructions with the same bits on every processor.
+/// Returns 2 to the power of a number that is not positive, with a relative error of at most 2e-15;
+/// numbers below -1000 are taken as -1000. The code has no branches and no fused arithmetic, so
+/// that loops over it become vector instructions with the same bits on every processor.
 ///
 /// ```
 /// use tagalong_math::exp2_of_negative;
@@ -8,9 +8,9 @@
 /// ```
 #[inline(always)]
 pub fn exp2_of_negative(x: f64) -> f64 {
-    // Adding this number leaves no digits behind the point, and the whole number in the low bits.
+    // Adding this number rounds to an integer, which then stands in the low bits.
     const WHOLE: f64 = 6_755_399_441_055_744.0;
-    // Less than 2^-1022 has no exponent of its own, and is nothing beside other terms of a sum.
+    // Powers below 2^-1022 would be subnormal, and are negligible beside other terms of a sum.
     let x = if x < -1000.0 { -1000.0 } else { x };
     let shifted = x + WHOLE;
     let rest = x - (shifted - WHOLE);
@@ -18,12 +18,13 @@ pub fn exp2_of_negative(x: f64) -> f64 {
     for term in &TERMS[1..] {
         root = root * rest + term;
     }
-    // The fourth root needs five terms less than the power itself.
+    // The series of the fourth root needs five terms less than that of the power itself.
     let square = root * root;
     square * square * f64::from_bits(shifted.to_bits().wrapping_add(1023) << 52)
 }
 
-/// Taylor series of 2^(r / 4), the last term first. The next one is below 1e-17 for r to one half.
+/// Taylor series of 2^(r / 4), the last term first. The first omitted term is below 1e-17 for r up
+/// to one half.
 const TERMS: [f64; 10] = terms();
 
 const fn terms() -> [f64; 10] {

@@ -4,11 +4,12 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 /// Increment of SplitMix64: the golden ratio in 64 bits, made odd.
 const GAMMA: u64 = 0x9E37_79B9_7F4A_7C15;
 
-/// Doubles between 0 and 1 that a random number can become: 53 bits are the precision of `f64`.
+/// Number of doubles between 0 and 1 that a random number can become: `f64` has a precision of 53
+/// bits.
 const STEPS: f64 = (1_u64 << 53) as f64;
 
-/// Source of random bits, with the distributions that are computed from them. They are implemented
-/// here, because those of general libraries change between versions.
+/// Source of random bits, with distributions that are computed from them. The distributions are
+/// implemented here, because those of general libraries change between versions.
 pub trait RandomSource {
     /// Returns the next 64 random bits.
     fn next_u64(&mut self) -> u64;
@@ -30,12 +31,12 @@ pub trait RandomSource {
 
     /// Returns a standard normal number (Box and Muller, Ann. Math. Stat. 1958).
     fn normal(&mut self) -> f64 {
-        // Never the logarithm of 0, therefore the uniform number that excludes it.
+        // `uniform` could return 0, whose logarithm is infinite.
         let radius = (-2.0 * self.positive_uniform().ln()).sqrt();
         radius * (std::f64::consts::TAU * self.positive_uniform()).cos()
     }
 
-    /// Returns a whole number below `end`, which must not be 0, as the remainder of 64 bits.
+    /// Returns an integer below `end`, the remainder of 64 random bits. `end` must not be 0.
     fn below(&mut self, end: u64) -> u64 {
         self.next_u64() % end
     }
@@ -48,7 +49,7 @@ pub trait RandomSource {
         all[self.below(all.len() as u64) as usize]
     }
 
-    /// Brings `items` into random order (Fisher and Yates).
+    /// Shuffles `items` (Fisher and Yates).
     fn shuffle<T>(&mut self, items: &mut [T])
     where
         Self: Sized,
@@ -59,7 +60,8 @@ pub trait RandomSource {
     }
 }
 
-/// SplitMix64 (Steele, Lea and Flood, OOPSLA 2014): small, seeded, the same everywhere.
+/// SplitMix64 (Steele, Lea and Flood, OOPSLA 2014): a small seeded generator with the same numbers
+/// on every machine.
 ///
 /// ```
 /// use tagalong_math::{RandomSource, SplitMix64};
@@ -69,7 +71,7 @@ pub trait RandomSource {
 pub struct SplitMix64(u64);
 
 impl SplitMix64 {
-    /// Creates the generator of a seed.
+    /// Creates a generator from a seed.
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
@@ -83,12 +85,12 @@ impl RandomSource for SplitMix64 {
     }
 }
 
-/// ChaCha with 8 rounds: for long runs of numbers that must be independent of each other.
+/// ChaCha with 8 rounds, for long sequences of independent numbers.
 #[derive(Clone, Debug)]
 pub struct ChaCha(ChaCha8Rng);
 
 impl ChaCha {
-    /// Creates a generator for one purpose: the streams of a seed are independent of each other.
+    /// Creates a generator for one purpose. Streams of the same seed are independent of each other.
     pub fn new(seed: u64, stream: u64) -> Self {
         let mut generator = ChaCha8Rng::seed_from_u64(seed);
         generator.set_stream(stream);
@@ -102,13 +104,13 @@ impl RandomSource for ChaCha {
     }
 }
 
-/// Xorshift with 64 bits (Marsaglia, J. of Statistical Software 2003): the cheapest, for choices
-/// whose quality does not matter.
+/// Xorshift with 64 bits (Marsaglia, J. of Statistical Software 2003): the fastest generator, for
+/// choices where the quality of the numbers does not matter.
 #[derive(Clone, Debug)]
 pub struct XorShift64(u64);
 
 impl XorShift64 {
-    /// Creates the generator of a seed; 0 would give zeros only and counts as 1.
+    /// Creates a generator from a seed; 0 would give zeros only, and is replaced by 1.
     pub fn new(seed: u64) -> Self {
         Self(seed.max(1))
     }
@@ -123,8 +125,7 @@ impl RandomSource for XorShift64 {
     }
 }
 
-/// Returns a number that stands for some bytes (FNV-1a of Fowler, Noll and Vo): the same on every
-/// machine, and another one for nearly all other bytes.
+/// Returns a hash of some bytes (FNV-1a of Fowler, Noll and Vo). It is the same on every machine.
 ///
 /// ```
 /// use tagalong_math::fingerprint;
@@ -137,8 +138,8 @@ pub fn fingerprint(bytes: impl IntoIterator<Item = u8>) -> u64 {
         .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(PRIME))
 }
 
-/// Returns the first number of [`SplitMix64`] from this seed: it looks random, and different seeds
-/// have different numbers.
+/// Returns the first number of [`SplitMix64`] for this seed, a hash of the seed: different seeds
+/// give different numbers.
 #[inline]
 pub fn mix(seed: u64) -> u64 {
     let z = seed.wrapping_add(GAMMA);
@@ -147,8 +148,8 @@ pub fn mix(seed: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// Returns the number of [`SplitMix64`] at an index, counted from 0, without those before it: for
-/// noise and textures that any thread computes in any order.
+/// Returns the number of [`SplitMix64`] at an index, counted from 0, without computing those before
+/// it: for noise and textures that threads compute in any order.
 #[inline]
 pub fn number_at(seed: u64, index: u64) -> u64 {
     mix(seed.wrapping_add(index.wrapping_mul(GAMMA)))

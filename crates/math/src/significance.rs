@@ -1,30 +1,31 @@
-//! Differences: how probable they are by chance alone.
+//! Tests whether differences can be due to chance.
 
 use serde::{Deserialize, Serialize};
 
 use crate::intervals::{CONFIDENCE, Interval, mean_interval};
 use crate::random::{RandomSource, SplitMix64};
 
-/// Up to so many differences all patterns of signs are counted, ...
+/// Up to this number of differences all sign patterns are counted, ...
 const EXACT_UP_TO: usize = 20;
-/// ... and so many are drawn of more. A word has a sign for each of 64.
+/// ... and beyond it this many random patterns are drawn. One random word has the signs of 64
+/// differences.
 const PATTERNS: usize = 99_999;
-/// Sums that are as large but for rounding are as large.
+/// Sums that are equal except for rounding count as equal.
 const ROUNDING: f64 = 1e-9;
 
-/// The outcome of a paired comparison.
+/// Result of a paired comparison.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Gain {
     /// Mean of the differences and its interval.
     pub difference: Interval,
-    /// Two-sided probability of such a difference if there were none.
+    /// Two-sided probability of a difference at least this large if there were none.
     pub p_value: f64,
 }
 
 /// Returns how much better `b` is than `a`, both scored on the same draws: the mean difference with
-/// its interval ([`mean_interval`]), and how probable it is that there is none ([`sign_flip`]).
-/// Pairs remove the differences between the draws themselves. `None` if the lists are empty or of
-/// different length, or hold a value that is no number.
+/// its interval ([`mean_interval`]) and its p-value ([`sign_flip`]). Pairing removes the
+/// differences between the draws themselves. `None` if the lists are empty, differ in length or
+/// contain NaN.
 ///
 /// ```
 /// let gain = tagalong_math::paired_gain(&[0.5, 0.2, 0.7], &[0.6, 0.4, 0.8]).unwrap();
@@ -37,21 +38,22 @@ pub fn paired_gain(a: &[f64], b: &[f64]) -> Option<Gain> {
     Some(Gain { difference, p_value: sign_flip(&differences)? })
 }
 
-/// Returns true if a p-value is significant at the confidence of the intervals. That of fewer than
-/// six draws never is: 2 of 2^5 patterns are 6 %. After a correction it takes more ([`draws_needed`]).
+/// Returns true if a p-value is significant at the confidence level of the intervals. With fewer
+/// than six draws it never is: 2 of 2^5 patterns are 6 %. After a correction it takes more
+/// ([`draws_needed`]).
 pub fn is_significant(p_value: f64) -> bool {
     p_value < 1.0 - CONFIDENCE
 }
 
-/// Returns the least number of draws with which a difference can be significant by [`sign_flip`] where
-/// so many are compared and corrected by [`holm`]: the least of them has to stay below the level
-/// after it is multiplied by their number.
+/// Returns the minimum number of draws with which a difference can be significant by [`sign_flip`]
+/// when this number of comparisons is corrected by [`holm`]: the smallest p-value has to stay below
+/// the level after it is multiplied by the number of comparisons.
 ///
 /// ```
 /// assert_eq!([1, 3, 6].map(tagalong_math::draws_needed), [6, 7, 8]);
 /// ```
 pub fn draws_needed(comparisons: usize) -> usize {
-    // Beyond the exact test the least p-value is 1 in 100,000, as with about 17 draws.
+    // Beyond the exact test the smallest p-value is 1 in 100,000, as with about 17 draws.
     let mut draws = 1;
     while draws < EXACT_UP_TO && !is_significant(least_p_value(draws) * comparisons as f64) {
         draws += 1;
@@ -59,17 +61,17 @@ pub fn draws_needed(comparisons: usize) -> usize {
     draws
 }
 
-/// Returns the p-value of so many draws that all differ the same way: one pattern of signs and its
-/// opposite are as far from zero.
+/// Returns the p-value if all of the draws differ in the same direction: only that sign pattern and
+/// its opposite are as far from zero.
 fn least_p_value(draws: usize) -> f64 {
     2.0 / (1u64 << draws) as f64
 }
 
-/// Returns the two-sided p-value of the hypothesis that differences lie symmetrically about
-/// zero (the sign-flip or permutation test: Fisher, 1935, section 21): the part of all
-/// 2^n patterns of signs whose sum is at least as far from zero. Exact up to 20
-/// differences; of more, from 99,999 drawn patterns and the given one (Phipson and
-/// Smyth, 2010). Nothing without differences, or with one that is no number.
+/// Returns the two-sided p-value of the hypothesis that differences are distributed symmetrically
+/// about zero (the sign-flip permutation test: Fisher, 1935, section 21): the fraction of all 2^n
+/// sign patterns whose sum is at least as far from zero. It is exact for up to 20 differences; for
+/// more it is estimated from 99,999 random patterns and the observed one (Phipson and Smyth, 2010).
+/// `None` without differences, or with NaN among them.
 ///
 /// ```
 /// assert_eq!(tagalong_math::sign_flip(&[0.1, 0.2]), Some(0.5));
@@ -82,7 +84,7 @@ pub fn sign_flip(differences: &[f64]) -> Option<f64> {
         return None;
     }
     let bar = differences.iter().sum::<f64>().abs() - ROUNDING * all;
-    // The largest first: the sum of the rest then soon decides nothing any more.
+    // With the largest first, the rest of a sum soon no longer affects the result.
     sizes.sort_by(|a, b| b.total_cmp(a));
     if sizes.len() <= EXACT_UP_TO {
         return Some(patterns_beyond(&sizes, 0.0, bar) / (1u64 << sizes.len()) as f64);
@@ -92,7 +94,7 @@ pub fn sign_flip(differences: &[f64]) -> Option<f64> {
     Some((beyond + 1) as f64 / (PATTERNS + 1) as f64)
 }
 
-/// Returns the number of patterns of signs of `rest` that take `sum` at least to the bar.
+/// Returns the number of sign patterns of `rest` that bring `sum` to at least `bar`.
 fn patterns_beyond(rest: &[f64], sum: f64, bar: f64) -> f64 {
     let left = rest.iter().sum::<f64>();
     match rest.split_first() {
@@ -115,9 +117,9 @@ fn drawn_sum(sizes: &[f64], random: &mut SplitMix64) -> f64 {
         .sum()
 }
 
-/// Returns the p-values of several comparisons as large as they have to be for any of
-/// them to count, in their order (Holm, Scand. J. Statist. 1979): with twenty comparisons one
-/// in twenty is below 0.05 by chance. One alone stays as it is.
+/// Returns the p-values of several comparisons, corrected for their number, in their order (Holm,
+/// Scand. J. Statist. 1979): of twenty comparisons, one is below 0.05 by chance. A single one stays
+/// as it is.
 ///
 /// ```
 /// assert_eq!(tagalong_math::holm(&[0.03, 0.01, 0.2]), [0.06, 0.03, 0.2]);

@@ -7,16 +7,16 @@ pub fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
-/// Returns the mean and the standard deviation of all values (divided by their number, not by one
-/// less); `None` without values.
+/// Returns the mean and the population standard deviation (divided by the number of values, not by
+/// one less); `None` without values.
 pub fn mean_and_deviation(values: &[f64]) -> Option<(f64, f64)> {
     let mean = mean(values)?;
     let squares = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
     Some((mean, (squares / values.len() as f64).sqrt()))
 }
 
-/// Returns the median, of an even number of values the upper of the middle two, so that it is
-/// always one of the values; `None` without values.
+/// Returns the median. For an even number of values it is the upper of the middle two, so that it
+/// is always one of the values; `None` without values.
 ///
 /// ```
 /// assert_eq!(tagalong_math::median([4.0, 1.0, 3.0, 2.0]), Some(3.0));

@@ -1,11 +1,11 @@
-//! Prints the vectors that a network for re-identification gives for boxes of an image, as JSON:
+//! Prints the embeddings that a re-identification network computes for boxes of an image, as JSON:
 //!
 //! ```sh
 //! cargo run --example vectors -- NETWORK.onnx IMAGE.ppm CONVENTION X,Y,WIDTH,HEIGHT ...
 //! ```
 //!
 //! The image is a binary PPM (P6) without comments. `CONVENTION` is `osnet`, `omz`, or `auto`.
-//! `tests/clients/check_networks.sh` compares the vectors with those of onnxruntime.
+//! `tests/clients/check_networks.sh` compares the embeddings with those of onnxruntime.
 #![allow(clippy::print_stdout, reason = "a program of a command line")]
 
 use std::env;

@@ -1,4 +1,4 @@
-//! From the outputs of a family to boxes in pixels of the network's input.
+//! Decoding of the outputs of a family into boxes, in pixels of the network's input.
 
 use nalgebra::Point2;
 use tagalong_core::{Joint, Joints};
@@ -8,12 +8,12 @@ use crate::family::{NANODET_BINS, NANODET_M_BINS, NANODET_STRIDES, STRIDES, coun
 use crate::values::{bins_of, is_score, is_transposed, unit_of_list, unit_of_rows};
 use crate::{BoxOrder, BoxUnit, Family, InputSize, Tensor};
 
-/// Joints of a person.
+/// Number of joints of a person.
 const JOINTS: usize = 17;
 /// Rows of YOLOv8 for people with joints: the box, the score, and column, row and score of each joint.
 const POSE_ROWS: usize = 5 + 3 * JOINTS;
-/// Part of the height between the highest and the lowest joint by which a person is higher than
-/// the eyes, and lower than the ankles.
+/// Fraction of the height between the highest and the lowest joint by which a person extends above
+/// the eyes, and below the ankles.
 const ABOVE_EYES: f64 = 0.08;
 const BELOW_ANKLES: f64 = 0.05;
 
@@ -21,15 +21,15 @@ const BELOW_ANKLES: f64 = 0.05;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ScoredBox {
-    /// The whole person.
+    /// Box around the whole person.
     pub rect: Rect,
     /// Probability of a person, 0 to 1.
     pub score: f32,
-    /// Joints of the person, from a network that finds them.
+    /// Joints of the person, if the network finds them.
     pub joints: Option<Joints>,
 }
 
-/// Boxes that are searched.
+/// Selection of boxes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Wanted<'a> {
     /// Classes of people.
@@ -43,7 +43,7 @@ pub(crate) struct Wanted<'a> {
 impl Wanted<'_> {
     /// Returns the highest score of the classes of people.
     fn best(&self, score: impl Fn(usize) -> Option<f32>) -> f32 {
-        // A maximum over numbers ignores NaN.
+        // `f32::max` ignores NaN.
         self.classes.iter().filter_map(|class| score(*class)).fold(f32::NEG_INFINITY, f32::max)
     }
 
@@ -51,7 +51,7 @@ impl Wanted<'_> {
         self.classes.iter().any(|class| (label - *class as f32).abs() < 0.5)
     }
 
-    /// Returns the box if it is likely and can be.
+    /// Returns the box if its score and its size are plausible.
     fn take(&self, score: f32, rect: impl FnOnce() -> Rect) -> Option<ScoredBox> {
         if score.is_nan() || score < self.min_score {
             return None;
@@ -66,7 +66,8 @@ impl Wanted<'_> {
 }
 
 /// Returns the boxes of people in outputs whose shapes fit the family ([`Family::classes`]), in
-/// pixels of the input. Without a unit of the boxes the numbers of lists tell it.
+/// pixels of the input. If no unit of the boxes is given, it is recognised from the numbers in the
+/// lists.
 pub(crate) fn decode(
     family: Family,
     outputs: &[(&str, &Tensor)],
@@ -104,7 +105,7 @@ pub(crate) fn decode(
     found
 }
 
-/// Returns the outputs of these names, if the network has them all.
+/// Returns the outputs with these names, if the network has them all.
 fn outputs_named<'a, const N: usize>(
     outputs: &[(&str, &'a Tensor)],
     names: [&str; N],
@@ -116,7 +117,7 @@ fn outputs_named<'a, const N: usize>(
     found.try_into().ok()
 }
 
-/// Changes a box and its joints from fractions of the input to pixels.
+/// Converts a box and its joints from fractions of the input to pixels.
 fn scale(person: &mut ScoredBox, input: InputSize) {
     let [columns, rows] = [input.width as f64, input.height as f64];
     let Rect { x, y, width, height } = person.rect;
@@ -140,7 +141,7 @@ fn around(x: f64, y: f64, width: f64, height: f64) -> Rect {
     Rect::new(x - 0.5 * width, y - 0.5 * height, width, height)
 }
 
-/// Returns the box of a row that begins with its middle and its size.
+/// Returns the box of a row that begins with its centre and its size.
 fn around_row(row: &[f32]) -> Rect {
     let [x, y, width, height] = [0, 1, 2, 3].map(|k| f64::from(row[k]));
     around(x, y, width, height)
@@ -196,13 +197,13 @@ fn yolo_v8(output: &Tensor, wanted: Wanted<'_>) -> Vec<ScoredBox> {
     found.collect()
 }
 
-/// Returns true if the rows after the score are those of joints rather than of classes: their places
-/// are no scores.
+/// Returns true if the rows after the score are those of joints rather than of classes, because
+/// their coordinates are not scores.
 fn has_pose_rows(rows: &[&[f32]]) -> bool {
     rows.len() == POSE_ROWS && rows[5].iter().any(|value| !is_score(*value))
 }
 
-/// Returns the joints of a person, each made of column and row, pixels of the input, and score.
+/// Returns the joints of a person; each consists of column and row, pixels of the input, and score.
 fn joints_of(joint: impl Fn(usize) -> [f32; 3]) -> Joints {
     let mut all = [Joint { at: Point2::origin(), score: 0.0 }; JOINTS];
     for (index, place) in all.iter_mut().enumerate() {
@@ -222,18 +223,19 @@ fn yolo_v8_rows(output: &Tensor, wanted: Wanted<'_>) -> Vec<ScoredBox> {
 
 /// Columns of a list of boxes.
 pub(crate) struct Columns {
-    /// The first corner: 1 after the number of an image, otherwise 0.
+    /// Column of the first corner: 1 after the index of an image, otherwise 0.
     pub first: usize,
     pub score: usize,
     pub label: usize,
 }
 
-/// Returns the columns of a list. Most have the score before the class, some after it: then one
-/// column has whole numbers alone, and the other has not.
+/// Returns the columns of a list. Most have the score before the class, some after it: in that case
+/// one column has integers only, and the other has not.
 pub(crate) fn columns_of(output: &Tensor) -> Columns {
     let first = usize::from(output.shape().last() == Some(&7));
     let [before, after] = [first + 4, first + 5];
-    // Lists with the number of the image have the class first (YOLOv7), unless it is no class.
+    // Lists with the index of the image have the class first (YOLOv7), unless that column cannot be
+    // a class.
     let is_last =
         has_whole_column(output, before) && (first == 1 || !has_whole_column(output, after));
     if is_last {
@@ -243,7 +245,7 @@ pub(crate) fn columns_of(output: &Tensor) -> Columns {
     }
 }
 
-/// Says whether a column has whole numbers only.
+/// Returns true if a column has integers only.
 fn has_whole_column(output: &Tensor, column: usize) -> bool {
     output.rows().all(|row| row[column].fract() == 0.0)
 }
@@ -282,8 +284,8 @@ pub(crate) struct StrideOutputs<'a> {
     sides: Vec<&'a [f32]>,
 }
 
-/// Returns the scores and the distributions for each stride; `None` if numbers do not tell which
-/// are which.
+/// Returns the scores and the distributions for each stride; `None` if their numbers do not
+/// distinguish them.
 pub(crate) fn scores_and_sides<'a>(
     outputs: &[(&str, &'a Tensor)],
     input: InputSize,
@@ -327,7 +329,7 @@ fn has_scores(tensor: &Tensor) -> bool {
     tensor.values().iter().copied().all(is_score)
 }
 
-/// Returns nothing for numbers that are not those of the family.
+/// Returns `None` for numbers that are not those of the family.
 fn nanodet_m(
     outputs: &[(&str, &Tensor)],
     input: InputSize,
@@ -342,7 +344,7 @@ fn nanodet_m(
             found.extend(wanted.take(score, || {
                 let bins = sides.len() / 4;
                 let stride = stride as f64;
-                // Sides are counted from the middle of a cell, other than in NanoDet-Plus.
+                // Distances to the sides start at the middle of a cell, unlike in NanoDet-Plus.
                 let [x, y] = [column, line].map(|cell| (cell + 0.5) * stride);
                 let [left, top, right, bottom] =
                     [0, 1, 2, 3].map(|k| stride * expectation(&sides[k * bins..][..bins]));
@@ -424,9 +426,10 @@ fn box_of_joints(joints: &[f32], input: InputSize) -> Rect {
     Rect::new(left, top - ABOVE_EYES * height, right - left, whole)
 }
 
-/// Drops the less likely of two boxes that overlap by more than `iou`; the likeliest come first.
+/// Drops the less likely of two boxes that overlap by more than `iou` (non-maximum suppression);
+/// the likeliest come first.
 pub(crate) fn suppress(mut boxes: Vec<ScoredBox>, iou: f64) -> Vec<ScoredBox> {
-    // Where scores are equal, the order of the file decides.
+    // Boxes with equal scores keep the order of the output.
     boxes.sort_by(|a, b| b.score.total_cmp(&a.score));
     let mut kept: Vec<ScoredBox> = Vec::new();
     for candidate in boxes {

@@ -1,4 +1,4 @@
-//! Network of one of the families, from a file to boxes in an image.
+//! Detection networks of one of the families, from a file to boxes in an image.
 
 use std::io::ErrorKind;
 use std::path::Path;
@@ -18,38 +18,38 @@ use crate::{
     Runtime, ScoredBox, Tensor,
 };
 
-/// Columns and rows of an input that the file leaves open.
+/// Columns and rows of an input whose size the file leaves open.
 pub(crate) const USUAL_SIZE: [usize; 2] = [640, 640];
-/// The same of integers with the channels last, which MoveNet has: its authors take them for six
-/// people.
+/// The same for integers with the channels last, as in MoveNet: the size that its authors use for
+/// six people.
 const MOVENET_SIZE: [usize; 2] = [256, 256];
-/// Most columns and rows of an input.
+/// Maximum number of columns and rows of an input.
 const MAX_SIDE: usize = 4096;
 /// Name of the input for the size of the image.
 const SIZES: &str = "orig_target_sizes";
 
-/// Columns and rows of an input, where the file leaves them open.
+/// Columns and rows of an input whose size the file leaves open.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OpenSize {
-    /// The choice of the caller, which a fixed size contradicts.
+    /// Size that the caller chose; an error if the file has a fixed size that differs.
     pub chosen: Option<[usize; 2]>,
-    /// Size without a choice.
+    /// Size if the caller chose none.
     pub usual: [usize; 2],
 }
 
-/// Choices that a file does not make.
+/// Choices of the caller that a file leaves open.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Choices {
-    /// The family; by default that of the outputs.
+    /// The family; by default recognised from the outputs.
     pub family: Option<Family>,
-    /// Columns and rows of the input, where the file leaves them open.
+    /// Columns and rows of the input, if the file leaves them open.
     pub size: Option<[usize; 2]>,
-    /// Classes of people; by default those that the file calls so, otherwise that of the family.
+    /// Classes of people; by default those that the file names so, otherwise that of the family.
     pub classes: Vec<usize>,
-    /// Unit of the boxes; by default that of the outputs.
+    /// Unit of the boxes; by default recognised from the outputs.
     pub unit: Option<BoxUnit>,
-    /// Order of the corners of a list; by default x before y, unless the boxes that are found tell
-    /// another one.
+    /// Order of the corners in a list; by default x before y. If the boxes that are found show
+    /// another order, that is an error.
     pub order: Option<BoxOrder>,
 }
 
@@ -60,15 +60,15 @@ pub struct About {
     pub inputs: Vec<Port>,
     /// Outputs as the file declares them.
     pub outputs: Vec<Port>,
-    /// Size and layout of the image that it takes; an error is a sentence.
+    /// Size and layout of the input image; an error is a sentence.
     pub input: Result<InputSize, String>,
     /// Outputs of a first call; an error is a sentence.
     pub run: Result<Vec<OutputShape>, String>,
-    /// Names of its classes, where the file has them.
+    /// Names of the classes, if the file has them.
     pub class_names: ClassNames,
-    /// Family by those outputs.
+    /// Family, recognised from those outputs.
     family: Result<Family, String>,
-    /// Unit of the boxes of a grid by those outputs.
+    /// Unit of the boxes of a grid, recognised from those outputs.
     unit: Option<BoxUnit>,
 }
 
@@ -95,11 +95,11 @@ impl About {
         Self { inputs, outputs, input: image, run, class_names, family, unit }
     }
 
-    /// Returns the classes of people: those that the file calls so, and without names that of the
+    /// Returns the classes of people: those that the file names so, or without names that of the
     /// family.
     ///
     /// # Errors
-    /// Names of which none is that of a person: a sentence with the names and the remedy.
+    /// If none of the names is that of a person: a sentence with the names and the remedy.
     pub fn people(&self, family: Family) -> Result<Vec<usize>, String> {
         if self.class_names.is_empty() || family == Family::MoveNet {
             return Ok(vec![family.person_class()]);
@@ -115,8 +115,8 @@ impl About {
         Ok(people)
     }
 
-    /// Returns the unit of the boxes, as far as the outputs of the first call tell it: lists of boxes
-    /// do only where something is found.
+    /// Returns the unit of the boxes, if the outputs of the first call show it. Lists of boxes do
+    /// so only if something was found.
     fn unit(&self, family: Family) -> Option<BoxUnit> {
         self.unit.filter(|_| matches!(family, Family::Yolox | Family::YoloV8))
     }
@@ -124,7 +124,7 @@ impl About {
     /// Returns the family of the network.
     ///
     /// # Errors
-    /// A sentence with the reason why there is none.
+    /// A sentence with the reason why it belongs to none.
     pub fn family(&self) -> Result<Family, String> {
         let family = self.family.clone()?;
         let has_sizes = self.inputs.iter().any(|port| port.name == SIZES);
@@ -149,7 +149,7 @@ fn read(path: &Path, limits: &Limits) -> Result<Vec<u8>, String> {
     })
 }
 
-/// Reads a network and runs it once, in a thread of its own.
+/// Reads a network and runs it once, in a separate thread.
 pub(crate) fn start(
     path: &Path,
     size: OpenSize,
@@ -175,7 +175,7 @@ pub fn inspect(path: &Path, size: Option<[usize; 2]>, limits: &Limits) -> Result
     start(path, size, limits, rten).map(|(_, about)| about)
 }
 
-/// Returns the index of the input that takes the image.
+/// Returns the index of the image input.
 fn image_port(inputs: &[Port]) -> Result<usize, String> {
     fn is_image(port: &Port) -> bool {
         port.shape.len() == 4
@@ -225,9 +225,9 @@ fn input_size(port: &Port, size: OpenSize) -> Result<InputSize, String> {
     Ok(InputSize { width, height, channels_last })
 }
 
-/// Adds the other inputs to the image.
+/// Returns the image together with the other inputs.
 fn with_sizes(inputs: &[Port], input: InputSize, image: Tensor) -> Vec<Tensor> {
-    // The boxes come back in pixels of the input, whatever the image was.
+    // The boxes then come back in pixels of the input, whatever the size of the image.
     let size = vec![input.width as f32, input.height as f32];
     let sizes = Tensor::new(vec![1, 2], size).unwrap_or_default();
     inputs
@@ -236,7 +236,7 @@ fn with_sizes(inputs: &[Port], input: InputSize, image: Tensor) -> Vec<Tensor> {
         .collect()
 }
 
-/// Returns the outputs for an image without anything in it.
+/// Returns the outputs for an empty image.
 fn first_run(network: &mut impl Network, input: InputSize) -> Result<Vec<Tensor>, String> {
     let shape = input.shape();
     let values = vec![0.0; shape.iter().product()];
@@ -245,7 +245,7 @@ fn first_run(network: &mut impl Network, input: InputSize) -> Result<Vec<Tensor>
     network.run(&inputs)
 }
 
-/// Network that finds people in images.
+/// Network that detects people in images.
 pub struct PersonNetwork {
     worker: Worker,
     about: About,
@@ -254,23 +254,24 @@ pub struct PersonNetwork {
     classes: Vec<usize>,
     unit: Option<BoxUnit>,
     order: BoxOrder,
-    /// Shapes of the boxes until now, where they tell the order of corners; `None` where it is known.
+    /// Shapes of the boxes so far, from which the order of corners can be recognised; `None` if the
+    /// order is known.
     shapes: Option<Shapes>,
     limits: Limits,
 }
 
 impl PersonNetwork {
-    /// Reads a file, and runs it once.
+    /// Reads a file and runs the network once.
     ///
     /// # Errors
-    /// A file that [`inspect`] refuses, outputs of another family than the chosen one or of none,
-    /// classes that the network does not have, and names of classes of which none is a person; the
-    /// message is a sentence about the file.
+    /// A file that [`inspect`] rejects, outputs of another family than the chosen one or of none,
+    /// classes that the network does not have, and class names without a person; the message is a
+    /// sentence about the file.
     pub fn load(path: &Path, choices: &Choices, limits: &Limits) -> Result<Self, String> {
         Self::load_with(rten, path, choices, limits)
     }
 
-    /// Reads a file as [`Self::load`] does, for another runtime.
+    /// Reads a file as [`Self::load`] does, with another runtime.
     ///
     /// # Errors
     /// Those of [`Self::load`].
@@ -326,12 +327,13 @@ impl PersonNetwork {
         self.family
     }
 
-    /// Finds people in an image: boxes in its pixels, the likeliest first, with a score of at
-    /// least `min_score`, and without those that overlap a likelier one by more than `iou` if the
-    /// family leaves that open. `None`: the call was not done within the deadline.
+    /// Detects people in an image: boxes in its pixels with a score of at least `min_score`, the
+    /// likeliest first. If the family leaves the suppression to the caller, boxes that overlap a
+    /// likelier one by more than `iou` are removed. `None` if the call did not finish within the
+    /// deadline.
     ///
     /// # Errors
-    /// A failure of the runtime, and boxes whose shapes are those of another order of corners, in a
+    /// A failure of the runtime, and boxes whose shapes show another order of corners, in a
     /// sentence.
     pub fn find(
         &mut self,
@@ -354,7 +356,7 @@ impl PersonNetwork {
         }
         let wanted = Wanted { classes: &self.classes, min_score, order: self.order };
         let found = decode(self.family, &outputs, self.input, self.unit, wanted);
-        // Lists without doubles are sorted all the same.
+        // Lists without duplicates are sorted as well.
         let iou = if self.family.needs_suppression(&shapes) { iou } else { 1.0 };
         let mut people = suppress(found, iou);
         for person in &mut people {
@@ -367,8 +369,8 @@ impl PersonNetwork {
         Ok(Some(people))
     }
 
-    /// Runs the network on a prepared image: its outputs in the order of the file, or `None` if
-    /// they were not there within the deadline.
+    /// Runs the network on a prepared image. Returns its outputs in the order of the file, or
+    /// `None` if they did not arrive within the deadline.
     ///
     /// # Errors
     /// A failure of the runtime, in a sentence.

@@ -1,4 +1,4 @@
-//! Networks that turn the image of a person into a vector: re-identification.
+//! Networks that turn the image of a person into an embedding, for re-identification.
 
 use std::path::Path;
 
@@ -13,11 +13,11 @@ use crate::network::rten;
 use crate::worker::Worker;
 use crate::{About, Colours, Family, Fit, IMAGENET, InputSize, Limits, Preparation};
 
-/// Columns and rows of an input that the file leaves open: those of the data sets of the field.
+/// Columns and rows of an input whose size the file leaves open: those of the usual data sets.
 const USUAL_SIZE: [usize; 2] = [128, 256];
-/// Numbers of a vector.
+/// Number of values of an embedding.
 const NUMBERS: std::ops::RangeInclusive<usize> = 2..=65_536;
-/// Numbers by which the convention of OpenVINO's models is recognised.
+/// Number of values by which the convention of OpenVINO's models is recognised.
 const OMZ_NUMBERS: usize = 256;
 
 /// Convention of the input of an embedding network.
@@ -25,7 +25,7 @@ const OMZ_NUMBERS: usize = 256;
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Convention {
-    /// OSNet and most others: red, green, blue by mean and deviation of ImageNet.
+    /// OSNet and most others: red, green, blue, normalised by mean and deviation of ImageNet.
     #[serde(rename = "osnet")]
     OsNet,
     /// `person-reidentification-retail` of the Open Model Zoo: blue, green, red, 0 to 255.
@@ -33,7 +33,7 @@ pub enum Convention {
 }
 
 impl Convention {
-    /// Returns its name in settings.
+    /// Returns the name of the convention in settings.
     pub const fn name(self) -> &'static str {
         match self {
             Self::OsNet => "osnet",
@@ -41,7 +41,7 @@ impl Convention {
         }
     }
 
-    /// Returns the preparation of images that its networks are trained with.
+    /// Returns the preparation of images with which the networks of this convention are trained.
     pub const fn preparation(self) -> Preparation {
         let [mean, deviation] = IMAGENET;
         let fit = Fit::Stretch;
@@ -59,7 +59,8 @@ impl Convention {
     }
 }
 
-/// Network that turns images of people into vectors: those of one person have a small angle.
+/// Network that turns images of people into embeddings: those of one person differ by a small
+/// angle.
 pub struct EmbeddingNetwork {
     worker: Worker,
     about: About,
@@ -70,14 +71,14 @@ pub struct EmbeddingNetwork {
 }
 
 impl About {
-    /// Returns the number of values of a person's vector, and the convention that networks with as
-    /// many have, if this is an embedding network: one output [1, n].
+    /// Returns the number of values of an embedding, and the convention of networks with that
+    /// number, if this is an embedding network: one output [1, n].
     ///
     /// # Errors
-    /// A sentence with the reason why it is none.
+    /// A sentence with the reason why it is not.
     pub fn embedding(&self) -> Result<(usize, Convention), String> {
         let shapes = self.run.clone()?;
-        // A vector of six or seven numbers has the shape of a list with one box.
+        // An embedding of six or seven values would have the shape of a list with one box.
         let is_list = self.family() == Ok(Family::YoloV10);
         if let ([output], [_], false) = (&shapes[..], &self.inputs[..], is_list)
             && let Some(numbers) = vector_of(&output.shape)
@@ -94,7 +95,7 @@ impl About {
     }
 }
 
-/// Returns the length of a vector with this shape; `None` if it is none.
+/// Returns the length of an embedding with this shape; `None` if it is not one.
 fn vector_of(shape: &[usize]) -> Option<usize> {
     let numbers = match *shape {
         [1, numbers] | [1, numbers, 1, 1] => numbers,
@@ -104,11 +105,12 @@ fn vector_of(shape: &[usize]) -> Option<usize> {
 }
 
 impl EmbeddingNetwork {
-    /// Reads a file, and runs it once. Without a `convention` it is that of the outputs.
+    /// Reads a file and runs the network once. Without a `convention` it is recognised from the
+    /// outputs.
     ///
     /// # Errors
-    /// A file that cannot be read or is beyond the limits, and one that is no embedding network;
-    /// the message is a sentence about the file.
+    /// A file that cannot be read or is beyond the limits, and one that is not an embedding
+    /// network; the message is a sentence about the file.
     pub fn load(
         path: &Path,
         convention: Option<Convention>,
@@ -127,18 +129,19 @@ impl EmbeddingNetwork {
         &self.about
     }
 
-    /// Returns the convention of its input.
+    /// Returns the convention of the input.
     pub fn convention(&self) -> Convention {
         self.convention
     }
 
-    /// Returns the size and layout of its input.
+    /// Returns the size and layout of the input.
     pub fn input(&self) -> InputSize {
         self.input
     }
 
-    /// Computes the vector of the person in a box, pixels; a part outside of the image is left
-    /// out. `None`: nothing of the box is inside, or the call was not done within the deadline.
+    /// Computes the embedding of the person in a box, pixels; a part of the box outside of the
+    /// image is left out. `None` if no part of the box is inside, or if the call did not finish
+    /// within the deadline.
     ///
     /// # Errors
     /// A failure of the runtime, in a sentence.
@@ -159,9 +162,9 @@ impl EmbeddingNetwork {
     }
 }
 
-/// Copies the part of an image inside a box; without pixels if there is none.
+/// Returns a copy of the image inside a box; it is empty if they do not overlap.
 fn cut(image: &RgbImage, part: &Rect) -> RgbImage {
-    // A box of less than a pixel has one.
+    // Even a box of less than a pixel gets one pixel.
     fn end(from: usize, to: f64, most: usize) -> usize {
         (to.round() as usize).clamp(from + 1, most)
     }

@@ -1,4 +1,4 @@
-//! Families of detectors: conventions of their inputs, and shapes of their outputs.
+//! Families of detectors: the conventions of their inputs, and the shapes of their outputs.
 
 use std::fmt;
 
@@ -11,17 +11,18 @@ use crate::{Colours, Fit, InputSize, Preparation, Tensor};
 /// Mean and deviation of ImageNet in red, green, blue, 0 to 255.
 pub const IMAGENET: [[f32; 3]; 2] = [[123.675, 116.28, 103.53], [58.395, 57.12, 57.375]];
 
-/// Values of a distribution for one side of a box of NanoDet-Plus.
+/// Number of values of the distribution for one side of a box in NanoDet-Plus.
 pub(crate) const NANODET_BINS: usize = 8;
-/// Values of a distribution for one side of a box of NanoDet before Plus: of its networks with 320
-/// and with 416 pixels.
+/// Number of values of the distribution for one side of a box in NanoDet before Plus, for its
+/// networks with 320 and with 416 pixels.
 pub(crate) const NANODET_M_BINS: [usize; 2] = [8, 11];
 /// Strides of the grids of most families.
 pub(crate) const STRIDES: [usize; 3] = [8, 16, 32];
 /// Strides of NanoDet-Plus.
 pub(crate) const NANODET_STRIDES: [usize; 4] = [8, 16, 32, 64];
 
-/// Most boxes of a list without doubles: more are cells of a grid.
+/// Maximum number of boxes of a list without duplicates: if there are more, they are cells of a
+/// grid.
 const FINAL_BOXES: usize = 300;
 
 /// Name and shape of an output.
@@ -47,14 +48,14 @@ impl fmt::Display for OutputShape {
 pub enum Family {
     /// YOLOX: offsets in grid cells, or boxes in pixels, objectness and classes.
     Yolox,
-    /// YOLOv8, 9, 11 and 12: boxes in pixels and classes, a row or a column for each.
+    /// YOLOv8, 9, 11 and 12: boxes in pixels and classes, with a row or a column for each box.
     #[serde(rename = "yolov8")]
     YoloV8,
     /// YOLOv10 and 26, exports of others with suppression or for DeepStream, and CenterNet: final
     /// boxes in pixels.
     #[serde(rename = "yolov10")]
     YoloV10,
-    /// RT-DETR, D-FINE and DEIM: final boxes by name, and a second input for the size.
+    /// RT-DETR, D-FINE and DEIM: final boxes in named outputs, and a second input for the size.
     RtDetr,
     /// RF-DETR: boxes as fractions of the image, logits of classes from 1.
     RfDetr,
@@ -78,7 +79,7 @@ impl fmt::Display for Family {
     }
 }
 
-/// Outputs, to be matched by name or, where there is only one, by its shape.
+/// Outputs of a network, which are matched by name or, if there is only one, by its shape.
 struct Outputs<'a>(&'a [OutputShape]);
 
 impl<'a> Outputs<'a> {
@@ -91,8 +92,8 @@ impl<'a> Outputs<'a> {
         Some(&output.shape)
     }
 
-    /// Returns the number of classes, zero for one that is not known, of outputs that are scores
-    /// and distributions for each stride; `None` if they are others.
+    /// Returns the number of classes (zero if it is unknown) for outputs that are scores and
+    /// distributions for each stride; `None` for other outputs.
     fn classes_by_stride(&self, input: InputSize) -> Option<usize> {
         let mut widths = None;
         for stride in STRIDES {
@@ -112,7 +113,7 @@ impl<'a> Outputs<'a> {
         if !is_distribution(a) && !is_distribution(b) {
             return None;
         }
-        // Where both widths are those of distributions, values tell.
+        // If both widths fit distributions, the values decide.
         Some(if !is_distribution(a) {
             a
         } else if !is_distribution(b) {
@@ -123,7 +124,7 @@ impl<'a> Outputs<'a> {
     }
 }
 
-/// Returns true for the width of the distributions of all sides of NanoDet before Plus.
+/// Returns true for the width of the distributions of all four sides in NanoDet before Plus.
 fn is_distribution(width: usize) -> bool {
     NANODET_M_BINS.iter().any(|bins| 4 * bins == width)
 }
@@ -142,7 +143,7 @@ impl Family {
         Self::YoloV10,
     ];
 
-    /// Returns its name in settings.
+    /// Returns the name of the family in settings.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Yolox => "yolox",
@@ -157,7 +158,7 @@ impl Family {
         }
     }
 
-    /// Returns the networks with this convention, in words.
+    /// Returns the networks of the family, in words.
     pub const fn networks(self) -> &'static str {
         match self {
             Self::Yolox => "YOLOX",
@@ -172,7 +173,7 @@ impl Family {
         }
     }
 
-    /// Returns the outputs that it needs, in words.
+    /// Returns the outputs that the family needs, in words.
     pub const fn outputs(self) -> &'static str {
         match self {
             Self::Yolox => "one output [1, cells of strides 8, 16, 32; 5 + classes]",
@@ -199,7 +200,7 @@ impl Family {
         }
     }
 
-    /// Returns the preparation of images that its networks are trained with.
+    /// Returns the preparation of images with which the networks of the family are trained.
     pub const fn preparation(self) -> Preparation {
         let [mean, deviation] = IMAGENET;
         let plain = Preparation {
@@ -236,14 +237,14 @@ impl Family {
     /// Returns the class of people in networks trained on COCO.
     pub const fn person_class(self) -> usize {
         match self {
-            // Trained on the category numbers of COCO, which start with 1.
+            // It is trained with the category numbers of COCO, which start with 1.
             Self::RfDetr => 1,
             _ => 0,
         }
     }
 
-    /// Returns the probability from which a box is usually taken for an object: that of the
-    /// examples of its authors where networks of the family are never sure, and otherwise a half.
+    /// Returns the probability from which a box is usually accepted: one half, or the value in the
+    /// authors' examples if networks of the family never reach high scores.
     pub const fn usual_score(self) -> f64 {
         match self {
             Self::MoveNet => 0.2,
@@ -261,8 +262,8 @@ impl Family {
         matches!(self, Self::YoloV10)
     }
 
-    /// Returns true if several boxes of one person are left to the caller. Lists of final boxes
-    /// are without doubles, but for those with a box for each cell of a grid.
+    /// Returns true if removing duplicate boxes of one person is left to the caller. Lists of final
+    /// boxes have no duplicates, except for those with a box for each cell of a grid.
     pub fn needs_suppression(self, outputs: &[OutputShape]) -> bool {
         match self {
             Self::Yolox | Self::YoloV8 | Self::NanoDet | Self::NanoDetM => true,
@@ -273,8 +274,9 @@ impl Family {
         }
     }
 
-    /// Returns the number of classes of a network with these outputs; `None` if they are not of
-    /// this family. Zero stands for classes that are not known: labels of a list of boxes.
+    /// Returns the number of classes of a network with these outputs; `None` if they do not belong
+    /// to this family. Zero means that the number is unknown, because the outputs are labels of a
+    /// list of boxes.
     pub fn classes(self, outputs: &[OutputShape], input: InputSize) -> Option<usize> {
         let outputs = Outputs(outputs);
         let cells = count_cells(input, &STRIDES);
@@ -286,7 +288,7 @@ impl Family {
                 width.checked_sub(4 * NANODET_BINS)
             }
             (Self::NanoDetM, Some(&[1, n, width])) if n == cells => {
-                // Which of the numbers of bins it is, values tell.
+                // The values decide which of the numbers of bins it is.
                 return (width > 4 * NANODET_M_BINS[0]).then_some(0);
             }
             (Self::NanoDetM, None) => return outputs.classes_by_stride(input),
@@ -337,11 +339,11 @@ pub(crate) fn shapes_of(outputs: &[(&str, &Tensor)]) -> Vec<OutputShape> {
         .collect()
 }
 
-/// Returns the family of a network by the shapes and the numbers of its outputs.
+/// Returns the family of a network, recognised from the shapes and the numbers of its outputs.
 ///
 /// # Errors
-/// Outputs of no family: a sentence with the families and their outputs. Outputs of several: a
-/// sentence with those.
+/// For outputs of no family, a sentence with all families and their outputs; for outputs of several
+/// families, a sentence with those.
 pub(crate) fn recognise(outputs: &[(&str, &Tensor)], input: InputSize) -> Result<Family, String> {
     let shapes = shapes_of(outputs);
     let shown: Vec<String> = shapes.iter().map(OutputShape::to_string).collect();
@@ -378,7 +380,7 @@ pub(crate) fn recognise(outputs: &[(&str, &Tensor)], input: InputSize) -> Result
     }
 }
 
-/// Returns families as a text: `yolox (YOLOX) or yolov8 (YOLOv8, v9, 11, 12)`.
+/// Returns the names of families as a text: `yolox (YOLOX) or yolov8 (YOLOv8, v9, 11, 12)`.
 fn any_of(families: &[Family]) -> String {
     let shown: Vec<String> =
         families.iter().map(|family| format!("`{family}` ({})", family.networks())).collect();

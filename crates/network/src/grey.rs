@@ -1,6 +1,6 @@
 use tagalong_core::{Derived, Frame, Result, RgbImage};
 
-/// Grey image of a frame as one of three equal colours.
+/// Grey image of a frame, converted to three equal colours.
 struct GreyAsColour(RgbImage);
 
 impl Derived for GreyAsColour {
@@ -9,7 +9,7 @@ impl Derived for GreyAsColour {
     }
 }
 
-/// Calls `run` with the colour image of a frame, or with its grey one in three equal colours.
+/// Calls `run` with the colour image of a frame, or with its grey image as three equal colours.
 ///
 /// # Errors
 /// [`tagalong_core::Error::MissingImage`] for a frame with neither.

@@ -1,28 +1,28 @@
-//! Networks that a user has installed: ONNX files by name, in a folder of the user.
+//! Networks that a user has installed: ONNX files in the user's data folder, referred to by name.
 
 use std::ffi::OsString;
 use std::path::{Component, Path, PathBuf};
 
 /// Environment variable that names the folder of the user's data.
 pub const DATA_FOLDER: &str = "TAGALONG_HOME";
-/// Folder of networks in it.
+/// Subfolder for networks.
 const NETWORKS: &str = "networks";
 
-/// Environment variables by name.
+/// Function that returns an environment variable by its name.
 pub type Variables = fn(&str) -> Option<OsString>;
 
 /// Returns the folder of installed networks: `networks` in the folder that `TAGALONG_HOME` names,
 /// otherwise in `tagalong` of `XDG_DATA_HOME`, otherwise in `.local/share/tagalong` of the home
-/// folder; `None` where none of them is known.
+/// folder; `None` if none of them is known.
 pub fn networks_folder() -> Option<PathBuf> {
     networks_folder_of(|name| std::env::var_os(name))
 }
 
-/// Returns the folder of installed networks by the environment variables that are given.
+/// Returns the folder of installed networks for the given environment variables.
 pub fn networks_folder_of(variable: Variables) -> Option<PathBuf> {
     let [own, shared, home] = [DATA_FOLDER, "XDG_DATA_HOME", "HOME"]
         .map(|name| variable(name).filter(|text| !text.is_empty()).map(PathBuf::from));
-    // The standard has relative paths ignored.
+    // The XDG standard says that relative paths are to be ignored.
     let shared = shared.filter(|path| path.is_absolute());
     let data = own
         .or_else(|| Some(shared?.join("tagalong")))
@@ -30,9 +30,9 @@ pub fn networks_folder_of(variable: Variables) -> Option<PathBuf> {
     Some(data.join(NETWORKS))
 }
 
-/// Returns the file that the `model` of a config names: relative to the folder of the config, or,
-/// where there is none and `model` is a plain name, the installed network of this name. A file that
-/// is not there at all is returned as the path in the folder of the config.
+/// Returns the file that the `model` of a config names: relative to the folder of the config or, if
+/// there is no such file and `model` is a plain name, the installed network of this name. If
+/// neither exists, the path in the folder of the config is returned.
 pub fn model_file(folder: &Path, model: &str) -> PathBuf {
     let file = folder.join(model);
     if file.exists() || !is_name(model) {
@@ -42,7 +42,7 @@ pub fn model_file(folder: &Path, model: &str) -> PathBuf {
     installed.filter(|installed| installed.is_file()).unwrap_or(file)
 }
 
-/// Returns the names of the installed networks, in the order of the alphabet.
+/// Returns the names of the installed networks in alphabetical order.
 pub(crate) fn installed_names() -> Vec<String> {
     let Some(folder) = networks_folder() else { return Vec::new() };
     let mut names = Vec::new();

@@ -1,16 +1,17 @@
 //! Neural networks from ONNX files.
 //!
-//! [`PersonNetwork`] reads a detector of one of the [families](Family), recognises it by its
-//! outputs, prepares images by its convention and decodes the outputs to boxes of people.
-//! [`EmbeddingNetwork`] turns the image of a person into a vector by which people are recognised.
-//! [`Network`] is the border to the runtime, which is `RtenNetwork` unless a [`Runtime`] is given. A
-//! build without the feature `rten` has none, and says so when a network is loaded.
+//! [`PersonNetwork`] reads a detector of one of the [families](Family), recognises the family from
+//! the outputs, prepares images by its convention and decodes the outputs into boxes of people.
+//! [`EmbeddingNetwork`] turns the image of a person into an embedding by which people are
+//! recognised. [`Network`] is the interface to the runtime, which is `RtenNetwork` unless a
+//! [`Runtime`] is given. A build without the feature `rten` has none, and reports this when a
+//! network is loaded.
 //!
-//! A file is not trusted: its bytes are surveyed before the runtime reads them, [`Limits`] bound
-//! its size, its operators and its tensors, and each call runs in a thread that is given up at a
-//! deadline. A call that is given up keeps its thread until it ends; a network has one thread, and
-//! every call until then is late as well. That is no sandbox: a file made to do harm may still use up the memory, so take
-//! networks from where you would take a program.
+//! A file is not trusted: its bytes are checked before the runtime reads them, [`Limits`] bound its
+//! size, its operators and its tensors, and each call runs in a thread and is abandoned at a
+//! deadline. An abandoned call keeps its thread until it ends; a network has only one thread, so
+//! every call until then is late as well. This is not a sandbox: a malicious file may still use up
+//! the memory, so trust the source of a network as you would that of a program.
 //!
 //! ```
 //! use tagalong_core::RgbImage;

@@ -3,20 +3,21 @@ use std::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Limits of a network: a file beyond them is refused, a call beyond its deadline is given up.
+/// Limits of a network: a file beyond them is rejected, and a call beyond its deadline is
+/// abandoned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// Largest file, bytes.
+    /// Maximum size of a file, bytes.
     pub file_bytes: u64,
-    /// Most operators of a file, those of its subgraphs included.
+    /// Maximum number of operators in a file, including those of its subgraphs.
     pub operators: usize,
-    /// Largest tensor that a file declares or that follows from its input, numbers.
+    /// Maximum number of values of a tensor that a file declares or that follows from its input.
     pub tensor_values: usize,
-    /// Longest time for one call.
+    /// Maximum time for one call.
     pub deadline: Duration,
-    /// Longest time for reading a file and a first call.
+    /// Maximum time for reading a file and a first call.
     pub load_deadline: Duration,
-    /// Threads of a call.
+    /// Number of threads of a call.
     pub threads: usize,
 }
 
@@ -33,24 +34,24 @@ impl Default for Limits {
     }
 }
 
-/// Limits of a network as a config states them, among the other settings of a table.
+/// Limits of a network as a config states them, among other settings of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct LimitSettings {
-    /// Threads of the network.
+    /// Number of threads of the network.
     #[schemars(range(min = 1, max = 256))]
     pub threads: usize,
-    /// A call that takes longer is given up, and its image has no result, s. Which calls are depends
-    /// on the machine: with a tight deadline two runs may differ.
+    /// A call that takes longer is abandoned, and its image has no result, s. Which calls are
+    /// abandoned depends on the machine: with a tight deadline two runs may differ.
     #[schemars(range(min = 1e-3, max = 3600.0))]
     pub deadline_s: f64,
-    /// Largest file, MB.
+    /// Maximum size of the file, MB.
     #[schemars(range(min = 1, max = 100_000))]
     pub max_file_mb: u64,
-    /// Most operators of a file.
+    /// Maximum number of operators of the file.
     #[schemars(range(min = 1, max = 10_000_000))]
     pub max_operators: usize,
-    /// Largest tensor, MB, as far as it follows from the file.
+    /// Maximum size of a tensor, MB, if it can be computed from the file.
     #[schemars(range(min = 1, max = 100_000))]
     pub max_tensor_mb: usize,
 }
@@ -68,12 +69,12 @@ impl Default for LimitSettings {
 }
 
 impl LimitSettings {
-    /// Returns the limits. The settings are within their ranges.
+    /// Converts the settings, which are within their ranges.
     pub fn limits(&self) -> Limits {
         Limits {
             file_bytes: self.max_file_mb << 20,
             operators: self.max_operators,
-            // A number of a tensor has four bytes.
+            // A value of a tensor has four bytes.
             tensor_values: self.max_tensor_mb << 18,
             deadline: Duration::from_secs_f64(self.deadline_s),
             threads: self.threads,

@@ -1,7 +1,7 @@
 //! Names of classes in the metadata of an ONNX file.
 //!
-//! Exports of Ultralytics have the entry `names` with the text of a dictionary of Python
-//! (`{0: 'helmet', 1: 'person'}`), other programs write JSON (`{"0": "helmet"}` or `["helmet"]`).
+//! Exports of Ultralytics have the entry `names` with a Python dictionary as text
+//! (`{0: 'helmet', 1: 'person'}`); other programs write JSON (`{"0": "helmet"}` or `["helmet"]`).
 
 use std::collections::BTreeMap;
 use std::iter::Peekable;
@@ -9,27 +9,27 @@ use std::str::Chars;
 
 use crate::survey::{Content, Fields};
 
-/// Fields of the messages, by `onnx.proto`.
+/// Field numbers of the messages in `onnx.proto`.
 const MODEL_METADATA: u64 = 14;
 const ENTRY_KEY: u64 = 1;
 const ENTRY_VALUE: u64 = 2;
 /// Key of the entry with the names.
 const KEY: &[u8] = b"names";
-/// Most names that are read.
+/// Maximum number of names that are read.
 const MAX_NAMES: usize = 10_000;
-/// Most names that a message lists, and most characters of each.
+/// Maximum number of names in a message, and of characters of each.
 const MAX_SHOWN: usize = 20;
 const MAX_CHARS: usize = 40;
-/// Names of people. The first excludes the others, which beside it are those of groups.
+/// Names for people. The first one excludes the others, which beside it stand for groups.
 const PERSON: &str = "person";
 const OTHER_PEOPLE: [&str; 2] = ["pedestrian", "people"];
 
-/// Names of the classes of a network by their numbers; empty where the file has none.
+/// Names of the classes of a network by class index; empty if the file has none.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ClassNames(BTreeMap<usize, String>);
 
 impl ClassNames {
-    /// Reads them from the bytes of a file. Damaged bytes and other texts have none.
+    /// Reads the names from the bytes of a file. Damaged bytes and other texts give none.
     pub(crate) fn of(file: &[u8]) -> Self {
         let mut fields = Fields(file);
         while let Some(Ok((number, content))) = fields.next() {
@@ -70,7 +70,7 @@ impl ClassNames {
         self.0.get(&class).map(String::as_str)
     }
 
-    /// Returns the classes that are called person, or otherwise pedestrian and people.
+    /// Returns the classes named person, or otherwise those named pedestrian and people.
     pub(crate) fn people(&self) -> Vec<usize> {
         let people = self.called(&[PERSON]);
         if people.is_empty() { self.called(&OTHER_PEOPLE) } else { people }
@@ -84,7 +84,7 @@ impl ClassNames {
             .collect()
     }
 
-    /// Returns the first of them as a text: `0 helmet, 1 vest`.
+    /// Returns the first names as a text: `0 helmet, 1 vest`.
     pub(crate) fn shown(&self) -> String {
         let mut shown = Vec::new();
         for (class, name) in self.0.iter().take(MAX_SHOWN) {
@@ -98,7 +98,7 @@ impl ClassNames {
     }
 }
 
-/// Returns the text of an entry of the metadata if its key is that of names.
+/// Returns the text of a metadata entry if its key is that of the names.
 fn names_of(entry: &[u8]) -> Option<&str> {
     let mut key: &[u8] = &[];
     let mut value: &[u8] = &[];
@@ -112,7 +112,7 @@ fn names_of(entry: &[u8]) -> Option<&str> {
     std::str::from_utf8(value).ok().filter(|_| key == KEY)
 }
 
-/// Reader of a literal of Python or of JSON.
+/// Reader of a Python or JSON literal.
 struct Reader<'a>(Peekable<Chars<'a>>);
 
 impl Reader<'_> {
@@ -120,8 +120,8 @@ impl Reader<'_> {
         while self.0.next_if(|next| next.is_whitespace()).is_some() {}
     }
 
-    /// Returns true before another entry, and false at the end, which it takes; `None` where the
-    /// text ends early.
+    /// Returns true if another entry follows. At the end it consumes the closing character and
+    /// returns false. `None` if the text ends early.
     fn next_is_not(&mut self, close: char) -> Option<bool> {
         self.skip_space();
         if self.0.next_if_eq(&',').is_some() {
@@ -131,7 +131,7 @@ impl Reader<'_> {
         Some(self.0.next_if_eq(&close).is_none())
     }
 
-    /// Reads the number of a class, in quotes or not, and the colon after it.
+    /// Reads a class index, in quotes or not, and the colon after it.
     fn class(&mut self) -> Option<usize> {
         let digits = match self.0.peek()? {
             '"' | '\'' => self.quoted()?,

@@ -1,9 +1,9 @@
 use crate::survey::Survey;
 use crate::{Limits, Port, Tensor};
 
-/// Neural network: named tensors in, named tensors out.
+/// Neural network with named tensors as inputs and outputs.
 ///
-/// The runtime stands behind this trait, so that another one is one more implementation.
+/// The runtime implements this trait, so that it can be replaced by another implementation.
 pub trait Network: Send {
     /// Returns the inputs in the order of [`Self::run`].
     fn inputs(&self) -> &[Port];
@@ -18,16 +18,16 @@ pub trait Network: Send {
     fn run(&mut self, inputs: &[Tensor]) -> Result<Vec<Tensor>, String>;
 }
 
-/// Function that makes a network of the bytes of an ONNX file.
+/// Function that creates a network from the bytes of an ONNX file.
 ///
 /// # Errors
-/// A file that it cannot run, in a sentence about the file.
+/// A file that the runtime cannot execute, in a sentence about the file.
 pub type Runtime = fn(Vec<u8>, &Limits) -> Result<Box<dyn Network>, String>;
 
-/// Makes a network that `rten` runs: the [`Runtime`] where no other one is named.
+/// Creates a network that runs on `rten`, the default [`Runtime`].
 ///
 /// # Errors
-/// Bytes that the survey refuses, operators that the runtime does not know, weights in another file,
+/// Bytes that fail the check, operators that the runtime does not know, weights in another file,
 /// and tensors that are too large; any file in a build without the feature `rten`. The message is a
 /// sentence.
 pub fn rten(bytes: Vec<u8>, limits: &Limits) -> Result<Box<dyn Network>, String> {
@@ -39,7 +39,8 @@ fn built_in(bytes: Vec<u8>, limits: &Limits) -> Result<Box<dyn Network>, String>
     Ok(Box::new(crate::RtenNetwork::from_onnx(bytes, limits)?))
 }
 
-/// Refuses every file, after the survey: a mistake in it comes before one in the choice of the build.
+/// Rejects every file, but checks it first: an error in the file is reported rather than the
+/// missing feature.
 #[cfg(not(feature = "rten"))]
 fn built_in(bytes: Vec<u8>, limits: &Limits) -> Result<Box<dyn Network>, String> {
     check_file(&bytes, limits)?;
@@ -48,7 +49,7 @@ fn built_in(bytes: Vec<u8>, limits: &Limits) -> Result<Box<dyn Network>, String>
         .into())
 }
 
-/// Refuses the bytes of an ONNX file that are damaged or beyond the limits, before a [`Runtime`]
+/// Rejects the bytes of an ONNX file that are damaged or beyond the limits, before a [`Runtime`]
 /// reads them.
 ///
 /// # Errors

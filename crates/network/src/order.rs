@@ -1,19 +1,20 @@
-//! Order of the corners of boxes in a list: x before y, or y before x as some exports of SSD have it. Shapes and
-//! ranges are those of both; people tell, standing and walking.
+//! Order of the corners of boxes in a list: x before y, or y before x as in some exports of SSD.
+//! Shapes and ranges are the same in both orders; the proportions of standing and walking people
+//! decide.
 
 use crate::ScoredBox;
 
-/// Number of boxes from which their shapes tell the order.
+/// Number of boxes from which their proportions decide the order.
 const LEAST_BOXES: u32 = 30;
-/// Number of boxes after which nothing is told any more: the order of a network does not change, and
-/// people may lie down.
+/// Number of boxes after which the check ends: the order of a network does not change, and people
+/// may lie down.
 const MOST_BOXES: u32 = 300;
-/// Share of the boxes that are wide where x and y are exchanged.
+/// Fraction of the boxes that are wide if x and y are exchanged.
 const NEARLY_ALL: f64 = 0.95;
 /// Ratio of width to height from which on a box is wide.
 const WIDE: f64 = 1.5;
 
-/// Shapes of the boxes of people that a network found until now.
+/// Proportions of the boxes of people that a network has found so far.
 #[derive(Debug, Default)]
 pub(crate) struct Shapes {
     boxes: u32,
@@ -21,10 +22,10 @@ pub(crate) struct Shapes {
 }
 
 impl Shapes {
-    /// Takes in the confident boxes of an image.
+    /// Adds the confident boxes of an image.
     ///
     /// # Errors
-    /// Nearly all boxes of people are wide: a sentence with the settings of which one is right.
+    /// If nearly all boxes of people are wide: a sentence with the settings, one of which is right.
     pub(crate) fn take(&mut self, people: &[ScoredBox], min_score: f64) -> Result<(), String> {
         if self.boxes > MOST_BOXES {
             return Ok(());

@@ -1,4 +1,4 @@
-//! From an image to the input of a network, and from its pixels back.
+//! Conversion of an image to the input of a network, and of pixels of the input back to the image.
 
 use nalgebra::Point2;
 use schemars::JsonSchema;
@@ -12,9 +12,9 @@ use crate::Tensor;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Fit {
-    /// Both sides scaled to the input, whatever the aspect ratio.
+    /// Both sides are scaled to the input, whatever the aspect ratio.
     Stretch,
-    /// Scaled with its aspect ratio, with padding on two sides.
+    /// Scaled with its aspect ratio, with the padding on two opposite sides.
     Centre,
     /// Scaled with its aspect ratio, with padding on the right and below.
     TopLeft,
@@ -35,24 +35,24 @@ pub enum Colours {
 pub struct Preparation {
     /// Way in which the image fills the input.
     pub fit: Fit,
-    /// Value of padded pixels, 0 to 255.
+    /// Value of the padding, 0 to 255.
     pub padding: f32,
     /// Order of the colour channels.
     pub colours: Colours,
-    /// Subtracted from each channel, in the order of the channels, 0 to 255.
+    /// Mean that is subtracted from each channel, in the order of the channels, 0 to 255.
     pub mean: [f32; 3],
-    /// Divides each channel.
+    /// Deviation by which each channel is divided.
     pub deviation: [f32; 3],
 }
 
-/// Size and layout of the image that a network takes.
+/// Size and layout of the input image of a network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InputSize {
     /// Columns.
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// The channels of a pixel lie together (NHWC), rather than each in a plane (NCHW).
+    /// True if the channels of a pixel lie together (NHWC), false if each has its own plane (NCHW).
     pub channels_last: bool,
 }
 
@@ -67,7 +67,7 @@ impl InputSize {
     }
 }
 
-/// Place of an image in the input of a network: input pixel = image pixel * scale + offset.
+/// Position of an image in the input of a network: input pixel = image pixel * scale + offset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
     scale: [f64; 2],
@@ -77,7 +77,7 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// Computes the place of an image of `width` times `height` pixels, both above zero.
+    /// Computes the position of an image of `width` times `height` pixels, both above zero.
     pub fn new(fit: Fit, width: usize, height: usize, input: InputSize) -> Self {
         let room = [input.width as f64, input.height as f64];
         let image = [width as f64, height as f64];
@@ -89,12 +89,13 @@ impl Placement {
             Fit::Centre => [0, 1].map(|k| (0.5 * (room[k] - size[k] as f64)).floor()),
             Fit::Stretch | Fit::TopLeft => [0.0; 2],
         };
-        // The size is whole pixels, so the scale is not quite that of the aspect ratio.
+        // The size is rounded to pixels, so the scale differs slightly from that of the aspect
+        // ratio.
         let scale = [0, 1].map(|k| size[k] as f64 / image[k]);
         Self { scale, offset, size }
     }
 
-    /// Returns the image pixel of an input pixel.
+    /// Converts a pixel of the input to the image.
     pub fn to_image(&self, input: Point2<f64>) -> Point2<f64> {
         Point2::new(
             (input.x - self.offset[0]) / self.scale[0],
@@ -102,13 +103,13 @@ impl Placement {
         )
     }
 
-    /// Returns the box in the image of a box in the input.
+    /// Converts a box in the input to the image.
     pub fn rect_to_image(&self, input: &Rect) -> Rect {
         let corner = self.to_image(Point2::new(input.x, input.y));
         Rect::new(corner.x, corner.y, input.width / self.scale[0], input.height / self.scale[1])
     }
 
-    /// Returns the joints in the image of joints in the input.
+    /// Converts joints in the input to the image.
     pub fn joints_to_image(&self, input: &Joints) -> Joints {
         input.moved(|at| self.to_image(at))
     }
@@ -122,7 +123,7 @@ struct Tap {
 }
 
 impl Tap {
-    /// Returns the value of a colour between the two neighbours.
+    /// Interpolates a colour between the two neighbours.
     #[inline]
     fn mix_pixels(&self, pixels: &[[u8; 3]], colour: usize) -> f32 {
         let first = f32::from(pixels[self.first][colour]);
@@ -131,8 +132,7 @@ impl Tap {
     }
 }
 
-/// Returns for each of `to` pixels the neighbours among `from` pixels, with pixel centres at a
-/// half.
+/// Returns for each of `to` pixels its neighbours among `from` pixels; pixel centres are at a half.
 fn taps(from: usize, to: usize) -> Vec<Tap> {
     let last = from - 1;
     (0..to)
@@ -145,7 +145,8 @@ fn taps(from: usize, to: usize) -> Vec<Tap> {
 }
 
 impl Preparation {
-    /// Prepares an image, and returns its place in the input; `None` for an image without pixels.
+    /// Prepares an image, and returns its position in the input as well; `None` for an image
+    /// without pixels.
     pub fn apply(&self, image: &RgbImage, input: InputSize) -> Option<(Tensor, Placement)> {
         let width = image.width();
         let height = image.height();
@@ -185,7 +186,7 @@ impl Preparation {
         Some((Tensor::new(input.shape(), values)?, place))
     }
 
-    /// Scales a value of a channel as the network was trained with.
+    /// Normalises a value of a channel as in the training of the network.
     #[inline]
     fn scaled_value(&self, channel: usize, value: f32) -> f32 {
         (value - self.mean[channel]) / self.deviation[channel]

@@ -1,4 +1,4 @@
-//! The runtime `rten` behind the trait [`Network`].
+//! The runtime `rten` as an implementation of the trait [`Network`].
 
 mod rewriting;
 
@@ -15,7 +15,7 @@ use crate::tensor::count;
 use crate::{Element, Limits, Network, Port, Tensor};
 use rewriting::without_scalar_division;
 
-/// Network that `rten` runs.
+/// Network that runs on `rten`.
 pub struct RtenNetwork {
     model: Model,
     options: RunOptions,
@@ -27,8 +27,8 @@ impl RtenNetwork {
     /// Reads the bytes of an ONNX file.
     ///
     /// # Errors
-    /// Bytes that the survey refuses, operators that the runtime does not know, weights in
-    /// another file, and tensors that are too large; the message is a sentence.
+    /// Bytes that fail the check, operators that the runtime does not know, weights in another
+    /// file, and tensors that are too large; the message is a sentence.
     pub fn from_onnx(bytes: Vec<u8>, limits: &Limits) -> Result<Self, String> {
         let survey = Survey::of(&bytes, limits)?;
         let bytes = without_scalar_division(bytes);
@@ -57,7 +57,7 @@ fn load_error(error: &rten::LoadError) -> String {
     format!("{why}{remedy}")
 }
 
-/// Refuses tensors between operators that are too large, as far as their shapes are known.
+/// Rejects tensors between operators that are too large, if their shapes are known.
 fn check_tensors(model: &Model, survey: &Survey, limits: &Limits) -> Result<(), String> {
     for name in &survey.values {
         let shape = model.find_node(name).and_then(|id| model.node_info(id)?.shape());

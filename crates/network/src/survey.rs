@@ -1,25 +1,25 @@
-//! A look at the bytes of an ONNX file before a runtime reads them.
+//! Check of the bytes of an ONNX file before a runtime reads them.
 //!
-//! An ONNX file is a Protocol Buffers message. The runtime that reads it bounds neither nesting nor
-//! the sizes that a few bytes can ask for, so [`Survey::of`] walks the message without allocating
-//! for it, counts its operators, and refuses those of its constants that make huge tensors.
+//! An ONNX file is a Protocol Buffers message. The runtime limits neither its nesting nor the sizes
+//! that a few bytes can request, so [`Survey::of`] walks over the message without allocating memory
+//! for it, counts its operators, and rejects those with constants that would create huge tensors.
 
 use std::collections::BTreeMap;
 
 use crate::Limits;
 
-/// Deepest nesting of graphs within operators.
+/// Maximum nesting of graphs within operators.
 const MAX_DEPTH: usize = 8;
-/// Deepest nesting of messages: three for each graph, and those of the type of a tensor.
+/// Maximum nesting of messages: three for each graph, and those of the type of a tensor.
 const MAX_MESSAGES: usize = 3 * MAX_DEPTH + 16;
-/// Most numbers of a constant that can be a size: no operator has a shape of more.
+/// Maximum number of values of a constant that can be a size: no operator has a shape with more.
 const MAX_SIZES: usize = 16;
-/// Operators whose output is as large as the numbers in a constant input ask for.
+/// Operators whose output size is given by the values of a constant input.
 const GROWING: [&str; 8] =
     ["ConstantOfShape", "Expand", "Tile", "Range", "Pad", "Resize", "Upsample", "OneHot"];
 
 /// Attributes that make the output of an operator larger, or its loops longer, with the largest
-/// numbers that networks have in them.
+/// values that occur in networks.
 const BOUNDED: [(&str, u64); 6] = [
     ("pads", 256),
     ("output_padding", 256),
@@ -36,16 +36,16 @@ pub struct Survey {
     pub operators: usize,
     /// Names of their outputs.
     pub values: Vec<String>,
-    /// Integer constants by name: the product of their numbers above one.
+    /// Integer constants by name: the product of their values above one.
     sizes: BTreeMap<String, f64>,
 }
 
 impl Survey {
-    /// Walks over a file.
+    /// Checks a file.
     ///
     /// # Errors
-    /// Bytes that are no ONNX file, a file that ends early, and one beyond the limits; the message
-    /// is a sentence with the remedy.
+    /// Bytes that are not an ONNX file, a file that ends early, and one beyond the limits; the
+    /// message is a sentence with the remedy.
     pub fn of(bytes: &[u8], limits: &Limits) -> Result<Self, String> {
         check_encoding(bytes, Part::Model, 0)?;
         let mut survey = Self::default();
@@ -67,7 +67,7 @@ impl Survey {
         if depth > MAX_DEPTH {
             return Err(format!("its graphs are nested more than {MAX_DEPTH} deep"));
         }
-        // Constants come first, because operators are judged by them.
+        // Constants come first, because the check of operators needs them.
         for field in Fields(graph) {
             if let (5, Content::Bytes(tensor)) = field? {
                 self.add_constant(&Constant::of(tensor)?, limits)?;
@@ -102,7 +102,7 @@ impl Survey {
         }
         let operator = Operator::of(node)?;
         for constant in &operator.constants {
-            // The constant of an operator `Constant` bears the name of its output.
+            // The constant of a `Constant` operator has the name of its output.
             let name = operator.outputs.first().cloned().unwrap_or_default();
             self.add_constant(&Constant { name, ..constant.clone() }, limits)?;
         }
@@ -125,7 +125,7 @@ impl Survey {
     }
 }
 
-/// Kind of message in a file, by `onnx.proto`.
+/// Kind of message in a file, as in `onnx.proto`.
 #[derive(Clone, Copy)]
 enum Part {
     Model,
@@ -141,12 +141,12 @@ enum Part {
     Map,
     Shape,
     Function,
-    /// A message that holds no other.
+    /// A message that contains no other.
     Leaf,
 }
 
 impl Part {
-    /// Returns the kind of message that a field of this one holds; `None` for a field without one.
+    /// Returns the kind of message in a field of this one; `None` for a field without one.
     fn within(self, field: u64) -> Option<Self> {
         Some(match (self, field) {
             (Self::Model, 7) | (Self::Attribute, 6 | 11) => Self::Graph,
@@ -170,8 +170,8 @@ impl Part {
     }
 }
 
-/// Refuses a message with damaged fields, or with groups, at any depth: a reader that skips over
-/// groups need not come to an end in a damaged one.
+/// Rejects a message with damaged fields, or with groups, at any depth: a reader that skips over
+/// groups may never end in a damaged one.
 fn check_encoding(message: &[u8], part: Part, depth: usize) -> Result<(), String> {
     if depth > MAX_MESSAGES {
         return Err(format!("its messages are nested more than {MAX_MESSAGES} deep"));
@@ -186,7 +186,7 @@ fn check_encoding(message: &[u8], part: Part, depth: usize) -> Result<(), String
     Ok(())
 }
 
-/// Operator of a graph, in pieces.
+/// Parts of an operator of a graph.
 #[derive(Default)]
 struct Operator<'a> {
     kind: &'a str,
@@ -241,9 +241,9 @@ impl<'a> Operator<'a> {
 #[derive(Clone, Debug, Default)]
 struct Constant {
     name: String,
-    /// Count of its numbers, by its dimensions.
+    /// Number of its values, from its dimensions.
     values: f64,
-    /// Product of its numbers above one, if they are few integers.
+    /// Product of its values above one, if they are a few integers.
     size: Option<f64>,
 }
 

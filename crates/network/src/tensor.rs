@@ -1,9 +1,9 @@
-//! Tensors at the border between a network and its callers.
+//! Tensors that are exchanged between a network and its callers.
 
 use std::fmt;
 
-/// Dense tensor of numbers, in row order. A network converts from and to the element types of its
-/// file.
+/// Dense tensor of numbers, in row-major order. A network converts them from and to the element
+/// types of its file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tensor {
     shape: Vec<usize>,
@@ -11,7 +11,7 @@ pub struct Tensor {
 }
 
 impl Tensor {
-    /// Creates a tensor; `None` unless the shape has as many numbers.
+    /// Creates a tensor; `None` if the number of values does not fit the shape.
     pub fn new(shape: Vec<usize>, values: Vec<f32>) -> Option<Self> {
         (count(&shape)? == values.len()).then_some(Self { shape, values })
     }
@@ -21,7 +21,7 @@ impl Tensor {
         &self.shape
     }
 
-    /// Returns the numbers in row order.
+    /// Returns the numbers in row-major order.
     pub fn values(&self) -> &[f32] {
         &self.values
     }
@@ -57,7 +57,7 @@ pub enum Element {
 pub struct Port {
     /// Name in the file.
     pub name: String,
-    /// Size of each dimension; `None` for one that the file leaves open.
+    /// Size of each dimension; `None` if the file leaves it open.
     pub shape: Vec<Option<usize>>,
     /// Type of the elements.
     pub element: Element,

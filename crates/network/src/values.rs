@@ -1,5 +1,5 @@
-//! Families told apart by the numbers of their outputs, where shapes are alike, and the unit of boxes:
-//! pixels of the input, or fractions of its sides.
+//! Recognition of the family from the numbers in the outputs, where shapes are alike, and of the
+//! unit of boxes: pixels of the input, or fractions of its sides.
 
 use std::ops::RangeInclusive;
 
@@ -10,20 +10,22 @@ use crate::decode::{Columns, columns_of, scores_and_sides};
 use crate::family::{NANODET_M_BINS, STRIDES, count_cells};
 use crate::{Family, InputSize, Tensor};
 
-/// Largest offset in cells, and largest logarithm of a size in cells, of a raw grid: a box is not
-/// `exp(16)` cells wide, and pixels exceed this in all but the first cells.
+/// Maximum offset in cells, and maximum logarithm of a size in cells, in a raw grid: a box is not
+/// `exp(16)` cells wide, and pixels exceed this value in all but the first cells.
 const MAX_RAW: f32 = 16.0;
-/// Rounding of probabilities.
+/// Tolerance for rounded probabilities.
 const ROUNDING: f32 = 1e-3;
-/// Rounding of corners, pixels.
+/// Tolerance for rounded corners, pixels.
 const ROUNDING_PX: f32 = 1.0;
-/// Columns of COCO's classes after four of the box: in a list of scores, and with an objectness.
+/// Number of columns for the four of the box and the 80 classes of COCO: without and with an
+/// objectness.
 const COCO_COLUMNS: [usize; 2] = [84, 85];
 
-/// Returns true if the numbers of outputs, whose shapes are those of a family, can be its numbers.
+/// Returns true if the numbers in the outputs, whose shapes are those of a family, are plausible
+/// for it.
 pub(crate) fn fits(family: Family, outputs: &[(&str, &Tensor)], input: InputSize) -> bool {
     let [(_, output)] = outputs else {
-        // Several outputs have names, or a shape for each stride.
+        // Several outputs are recognised by their names, or by their shapes for each stride.
         return family != Family::NanoDetM || scores_and_sides(outputs, input).is_some();
     };
     if is_empty(output) {
@@ -39,26 +41,26 @@ pub(crate) fn fits(family: Family, outputs: &[(&str, &Tensor)], input: InputSize
     }
 }
 
-/// Returns true for an output of zeros alone. Lists in which nothing was found are such, and nothing
-/// tells of which family they are.
+/// Returns true for an output of zeros only. Lists are empty in this way if nothing was found, and
+/// then do not show their family.
 pub(crate) fn is_empty(output: &Tensor) -> bool {
     output.values().iter().all(|value| *value == 0.0)
 }
 
-/// Returns true if the output of YOLOv8 has a row for each box. The numbers tell where it has as many
-/// columns.
+/// Returns true if the output of YOLOv8 has a row for each box. If it has as many rows as columns,
+/// the numbers decide.
 pub(crate) fn is_transposed(output: &Tensor, input: InputSize) -> bool {
     let cells = count_cells(input, &STRIDES);
     let &[1, rows, width] = output.shape() else { return false };
     rows == cells && (width != cells || has_boxes(output, 4, input))
 }
 
-/// Returns true for a probability, but for its rounding.
+/// Returns true for a probability, with a tolerance for rounding.
 pub(crate) fn is_score(value: f32) -> bool {
     (-ROUNDING..=1.0 + ROUNDING).contains(&value)
 }
 
-/// Returns true for the number of a class.
+/// Returns true for a class index.
 fn is_label(value: f32) -> bool {
     value >= 0.0 && value.fract() == 0.0
 }
@@ -72,8 +74,8 @@ fn is_raw_grid(output: &Tensor, input: InputSize) -> bool {
     is_raw && unit_of_rows(output, input) != Some(BoxUnit::Fractions)
 }
 
-/// Returns true for a grid with middles and sizes, and scores of which `first` is the first column of
-/// a class.
+/// Returns true for a grid with centres and sizes, and scores; `first` is the first column of a
+/// class.
 fn has_boxes(output: &Tensor, first: usize, input: InputSize) -> bool {
     let width = output.shape().last().copied().unwrap_or(0);
     let other = COCO_COLUMNS[usize::from(first == 4)];
@@ -83,7 +85,7 @@ fn has_boxes(output: &Tensor, first: usize, input: InputSize) -> bool {
         && output.rows().all(|row| row[4..].iter().copied().all(is_score))
 }
 
-/// Returns true for a grid with a column for each box: middles and sizes, and scores of the first
+/// Returns true for a grid with a column for each box: centres and sizes, and scores of the first
 /// class. The rows below may be those of other classes, of joints, or of an angle.
 fn is_grid_of_columns(output: &Tensor, input: InputSize) -> bool {
     let has_scores = output.rows().nth(4).is_some_and(|row| row.iter().copied().all(is_score));
@@ -103,7 +105,7 @@ pub(crate) fn bins_of(output: &Tensor) -> Option<usize> {
     })
 }
 
-/// Returns true for a list of boxes by their corners, with scores and classes.
+/// Returns true for a list of boxes given by corners, with scores and classes.
 fn is_list(output: &Tensor, input: InputSize) -> bool {
     let Columns { first, score, label } = columns_of(output);
     let side = input.width.max(input.height) as f32;
@@ -117,18 +119,19 @@ fn is_list(output: &Tensor, input: InputSize) -> bool {
     })
 }
 
-/// Largest offset of a raw grid, cells: places in pixels exceed it in all but the first cells.
+/// Maximum offset of a raw grid, cells: positions in pixels exceed it in all but the first cells.
 const MAX_OFFSET: f32 = 16.0;
-/// Range of fractions, with room for a box that is partly outside. A box within as many pixels is no
-/// person.
+/// Range of fractions, with a margin for boxes that are partly outside. A box within this number of
+/// pixels is too small for a person.
 const FRACTIONS: RangeInclusive<f32> = -0.5..=1.5;
-/// Least difference between the mean places of the two halves of a grid, as a fraction: it is a half
-/// where boxes are in their cells, and none where they are offsets.
+/// Minimum difference between the mean positions of the two halves of a grid, as a fraction: about
+/// one half if boxes are in their cells, and zero if the numbers are offsets.
 const LEAST_SPREAD: f64 = 0.25;
-/// Part of the boxes of a grid that have a size. Networks without distributions make some below zero.
+/// Fraction of the boxes of a grid that must have a positive size. Networks without distributions
+/// give some negative ones.
 const MOST: f64 = 0.9;
 
-/// Order of the numbers of corners in a list of boxes.
+/// Order of the coordinates of corners in a list of boxes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
@@ -141,7 +144,7 @@ pub enum BoxOrder {
 }
 
 impl BoxOrder {
-    /// Returns four numbers as left, top, right and bottom.
+    /// Returns four coordinates as left, top, right and bottom.
     pub(crate) fn sorted(self, corners: &[f32]) -> [f32; 4] {
         let places = match self {
             Self::Xyxy => [0, 1, 2, 3],
@@ -162,15 +165,15 @@ pub enum BoxUnit {
     Fractions,
 }
 
-/// Middles and sizes of the boxes of a grid.
+/// Centres and sizes of the boxes of a grid.
 struct Grid {
     places: Vec<[f32; 4]>,
-    /// There is a column for each box, as in no grid with offsets.
+    /// True if there is a column for each box; grids with offsets never have that.
     has_columns: bool,
 }
 
 impl Grid {
-    /// Takes the boxes of an output with a row for each; none are in one with another shape.
+    /// Reads the boxes of an output with a row for each; an output of another shape has none.
     fn of_rows(output: &Tensor, input: InputSize) -> Self {
         let mut places = Vec::new();
         if let &[1, rows, width] = output.shape()
@@ -182,7 +185,7 @@ impl Grid {
         Self { places, has_columns: false }
     }
 
-    /// Takes the boxes of an output with a column for each.
+    /// Reads the boxes of an output with a column for each.
     fn of_columns(output: &Tensor, input: InputSize) -> Self {
         let mut places = Vec::new();
         let rows: Vec<&[f32]> = output.rows().take(4).collect();
@@ -204,8 +207,8 @@ impl Grid {
         }
     }
 
-    /// Returns true if places exceed those of offsets, and near the far end of the image a middle
-    /// exceeds the size of its box, as it never does where corners are meant.
+    /// Returns true if positions exceed the range of offsets, and a centre near the far end of the
+    /// image exceeds the size of its box, which never happens if the numbers are corners.
     fn is_in_pixels(&self) -> bool {
         let mut sized = 0;
         let mut is_beyond = false;
@@ -219,8 +222,8 @@ impl Grid {
         is_beyond && is_middle && sized as f64 >= least * self.places.len() as f64
     }
 
-    /// Returns true if all places are fractions, and those of the cells with the first stride run
-    /// from one side of the image to the other, as offsets never do.
+    /// Returns true if all positions are fractions, and those of the cells with the first stride
+    /// cover the image from one side to the other, as offsets never do.
     fn is_in_fractions(&self, input: InputSize) -> bool {
         let columns = input.width.div_ceil(STRIDES[0]);
         let rows = input.height.div_ceil(STRIDES[0]);
@@ -245,8 +248,8 @@ impl Grid {
     }
 }
 
-/// Returns the unit of a grid with a row of middle and size for each box; `None` for offsets in cells
-/// and other numbers.
+/// Returns the unit of a grid with a row of centre and size for each box; `None` for offsets in
+/// cells and other numbers.
 pub(crate) fn unit_of_rows(output: &Tensor, input: InputSize) -> Option<BoxUnit> {
     Grid::of_rows(output, input).unit(input)
 }
@@ -256,8 +259,8 @@ pub(crate) fn unit_of_columns(output: &Tensor, input: InputSize) -> Option<BoxUn
     Grid::of_columns(output, input).unit(input)
 }
 
-/// Returns the unit of a list of corners: fractions if those of all boxes with a score of at least
-/// `min_score` are; `None` where there are no such boxes.
+/// Returns the unit of a list of corners: fractions if all boxes with a score of at least
+/// `min_score` have fractions; `None` without such boxes.
 pub(crate) fn unit_of_list(output: &Tensor, min_score: f32) -> Option<BoxUnit> {
     let Columns { first, score, .. } = columns_of(output);
     let mut unit = None;

@@ -1,4 +1,4 @@
-//! A network in a thread of its own, so that a call can be given up.
+//! A network in a separate thread, so that a call can be abandoned.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError, sync_channel};
 use std::thread;
@@ -12,13 +12,13 @@ type Answer = Result<Vec<Tensor>, String>;
 pub(crate) struct Worker {
     jobs: SyncSender<Vec<Tensor>>,
     answers: Receiver<Answer>,
-    /// A call was given up and its answer has not arrived.
+    /// True while the answer of an abandoned call is outstanding.
     late: bool,
 }
 
 impl Worker {
-    /// Starts a thread that makes a network with `load` and then waits for calls; the second value
-    /// is returned by `about` from the network.
+    /// Starts a thread that creates a network with `load` and then waits for calls. The second
+    /// value is the one that `about` returns for the network.
     ///
     /// # Errors
     /// Those of `load` and `about`; a panic in them; no answer within `deadline`.
@@ -42,7 +42,7 @@ impl Worker {
                 return;
             }
             while let Ok(inputs) = queue.recv() {
-                // A receiver that is gone does not want the answer.
+                // If the receiver is gone, the answer is not needed any more.
                 if done.send(network.run(&inputs)).is_err() {
                     return;
                 }
@@ -58,7 +58,7 @@ impl Worker {
         Ok((Self { jobs, answers, late: false }, told))
     }
 
-    /// Runs the network; `None` if the call, or one before it, is not done within `deadline`.
+    /// Runs the network; `None` if this call, or an earlier one, does not finish within `deadline`.
     ///
     /// # Errors
     /// Those of [`Network::run`], and a panic of the runtime.
@@ -77,7 +77,7 @@ impl Worker {
         let begun = Instant::now();
         self.jobs.send(inputs).map_err(|_| broken())?;
         match self.answers.recv_timeout(deadline) {
-            // An answer is found at once, however late this thread was woken.
+            // An answer that is there in time counts, however late this thread was woken.
             Ok(answer) if begun.elapsed() <= deadline => answer.map(Some),
             Ok(_) => Ok(None),
             Err(RecvTimeoutError::Timeout) => {

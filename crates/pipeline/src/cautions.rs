@@ -26,9 +26,10 @@ impl Pipeline {
             return Vec::new();
         }
         if steering.leaves_view() {
-            let words = "the controller keeps the person beside or behind the robot, and no detector uses a laser \
-                         scan: a camera that looks ahead does not see them there; add a detector that does, as \
-                         docs/systems/following.md shows, or follow behind (`side = \"behind\"`)";
+            let words = "the controller keeps the person beside or behind the robot, where a \
+                         camera that looks ahead does not see them, and no detector uses a laser \
+                         scan: add such a detector, as docs/systems/following.md shows, or follow behind \
+                         (`side = \"behind\"`)";
             return vec![words.to_owned()];
         }
         let suits = self.config.suits.camera_height_m;
@@ -53,9 +54,10 @@ fn above_image(distance_m: f64, camera: Option<&Camera>) -> Option<String> {
         let camera_m = TALL_M - distance_m * HALF_VIEW_DEG.to_radians().tan();
         return (camera_m > USUAL_CAMERA_M).then(|| {
             format!(
-                "at a stand-off of {distance_m:.2} m a level camera with a view of {:.0} degrees in height sees \
-                 the head of a tall person ({TALL_M} m) only from {camera_m:.2} m above the floor on: {raise}, or \
-                 compare with your camera (`tagalong check CONFIG LOG`)",
+                "at a stand-off of {distance_m:.2} m a level camera with a vertical field of view \
+                 of {:.0} degrees sees the head of a tall person ({TALL_M} m) only if mounted at \
+                 least {camera_m:.2} m above the floor: {raise}, or check with your camera \
+                 (`tagalong check CONFIG LOG`)",
                 2.0 * HALF_VIEW_DEG
             )
         });
@@ -103,7 +105,7 @@ mod tests {
     fn without_a_camera_the_height_that_one_needs_is_told() {
         assert_eq!(above_image(1.8, None), None);
         let near = above_image(1.3, None).expect("near");
-        assert!(near.contains("only from 1.40 m above the floor on"), "{near}");
+        assert!(near.contains("only if mounted at least 1.40 m above the floor"), "{near}");
     }
 
     #[cfg(feature = "plugins")]

@@ -21,11 +21,11 @@ pub struct Difference<'a> {
     pub event: &'a EventRow,
 }
 
-/// Lists the events of only one of the pipelines `a` and `b`, by log and seed, then by time, on the
-/// logs that both finished.
+/// Lists the events that only one of the pipelines `a` and `b` has, by log and seed, then by time,
+/// on the logs that both finished.
 ///
-/// Two events are the same if they are of one kind, concern the same person and lie at most half a
-/// second apart. Ids of tracks are not comparable between pipelines and are ignored.
+/// Two events are the same if they have the same kind and person and are at most half a second
+/// apart. IDs of tracks are not comparable between pipelines and are ignored.
 pub fn compare<'a>(benchmark: &'a Benchmark, a: &str, b: &str) -> Vec<Difference<'a>> {
     compare_in(&OrderedBenchmark::new(benchmark), a, b)
 }
@@ -37,7 +37,7 @@ pub fn compare_in<'a>(view: &OrderedBenchmark<'a>, a: &str, b: &str) -> Vec<Diff
         let Some(of_b) = of_b else { continue };
         let mut here = only_one(of_a, of_b);
         here.sort_by(|x, y| {
-            // Of equal times by pipeline, so that the order is always the same.
+            // Events of equal time are sorted by pipeline, so that the order is always the same.
             x.event.t_s.total_cmp(&y.event.t_s).then_with(|| x.pipeline.cmp(y.pipeline))
         });
         all.extend(here);
@@ -46,7 +46,7 @@ pub fn compare_in<'a>(view: &OrderedBenchmark<'a>, a: &str, b: &str) -> Vec<Diff
     all
 }
 
-/// Kind of an event and the id of the person.
+/// Kind of an event and ID of the person.
 type Key<'a> = (&'a str, Option<i64>);
 
 fn only_one<'a>(a: &'a TaskResult, b: &'a TaskResult) -> Vec<Difference<'a>> {
@@ -70,7 +70,7 @@ fn only_one<'a>(a: &'a TaskResult, b: &'a TaskResult) -> Vec<Difference<'a>> {
     out
 }
 
-/// Returns the events with a finite time by kind and person, in the order of time.
+/// Returns the events with a finite time by kind and person, in chronological order.
 fn by_key(task: &TaskResult) -> BTreeMap<Key<'_>, Vec<&EventRow>> {
     let mut map: BTreeMap<Key<'_>, Vec<&EventRow>> = BTreeMap::new();
     for event in task.events.iter().filter(|e| e.t_s.is_finite()) {
@@ -80,9 +80,9 @@ fn by_key(task: &TaskResult) -> BTreeMap<Key<'_>, Vec<&EventRow>> {
     map
 }
 
-/// Pairs two lists in the order of time and returns the events without a partner. Taking the
-/// earliest possible partner leaves as few as possible alone, because the allowed distance is the
-/// same for all.
+/// Pairs two lists in chronological order and returns the events without a partner. Because the
+/// allowed distance is the same for all, taking the earliest possible partner leaves the fewest
+/// events unpaired.
 fn unmatched<'a>(a: &[&'a EventRow], b: &[&'a EventRow]) -> (Vec<&'a EventRow>, Vec<&'a EventRow>) {
     let mut only_a = Vec::new();
     let mut only_b = Vec::new();

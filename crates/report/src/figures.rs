@@ -1,4 +1,4 @@
-//! Figures of the headline: their names, units and directions.
+//! Figures of merit: their names, units and directions.
 
 use tagalong_eval::Scores;
 
@@ -14,7 +14,7 @@ pub enum ComparisonSpace {
 impl ComparisonSpace {
     pub const ALL: [Self; 2] = [Self::Image, Self::Floor];
 
-    /// Returns the prefix of the keys of figures.
+    /// Returns the prefix of the keys of its figures.
     pub const fn key(self) -> &'static str {
         match self {
             Self::Image => "image",
@@ -42,15 +42,16 @@ pub struct Figure {
     pub range: [f64; 2],
     /// Meaning, in one line.
     pub meaning: &'static str,
-    /// Spaces in which it is shown.
+    /// Spaces in which the figure is shown.
     pub places: &'static [ComparisonSpace],
-    /// True if pipelines are compared by it in pairs.
+    /// True if pairs of pipelines are compared by it.
     pub compared: bool,
     of: fn(&Scores) -> Option<f64>,
 }
 
 impl Figure {
-    /// Returns the figure of a task, if it is finite; of single frames none that needs more than one.
+    /// Returns the value of the figure for a task, if it is finite; `None` for single frames if the
+    /// figure needs several.
     pub fn of(&self, place: ComparisonSpace, task: &TaskResult) -> Option<f64> {
         if task.single_frames && OVER_TIME.contains(&self.name) {
             return None;
@@ -68,7 +69,8 @@ impl Figure {
         if self.higher_is_better { a > b } else { a < b }
     }
 
-    /// Returns true if `a` is better than `b` also with the decimals that a page prints.
+    /// Returns true if `a` is better than `b` even after rounding to the decimals that a page
+    /// prints.
     pub fn better_as_printed(&self, a: f64, b: f64) -> bool {
         let parts = 10_f64.powi(self.decimals as i32);
         self.better((a * parts).round(), (b * parts).round())
@@ -80,21 +82,23 @@ impl Figure {
     }
 }
 
-/// Different scores of which the miss rate over false reports is a curve: of fewer it is some points.
+/// Number of distinct scores from which the plot of miss rate against false positives is a curve
+/// rather than a few points.
 pub const FEW_SCORES: u64 = 10;
 
-/// Returns true if the reports have so few different scores that figures over them tell little.
+/// Returns true if the reports have so few distinct scores that figures over scores have little
+/// meaning.
 pub fn has_few_scores(scores: &Scores) -> bool {
     // Results of earlier versions did not count them.
     (1..FEW_SCORES).contains(&scores.distinct_scores)
 }
 
-/// Returns the figure unless the reports have so few scores that it tells little.
+/// Returns the log-average miss rate, unless the reports have too few distinct scores for it.
 pub fn lamr_of_enough_scores(scores: &Scores) -> Option<f64> {
     scores.lamr.filter(|_| !has_few_scores(scores))
 }
 
-/// Figures of what happens over several frames.
+/// Figures of events over several frames.
 const OVER_TIME: [&str; 8] = [
     "HOTA",
     "AssA",
@@ -129,34 +133,30 @@ const RATE: Figure = Figure {
 const FIGURES: &[Figure] = &[
     Figure {
         name: "HOTA",
-        meaning: "Finding people and keeping them apart, in balance. 1 is perfect.",
+        meaning: "Detection and association together. 1 is perfect.",
         compared: true,
         of: |s| s.hota,
         ..RATE
     },
-    Figure {
-        name: "DetA",
-        meaning: "The part of HOTA for finding people.",
-        of: |s| s.det_a,
-        ..RATE
-    },
+    Figure { name: "DetA", meaning: "The detection part of HOTA.", of: |s| s.det_a, ..RATE },
     Figure {
         name: "AssA",
-        meaning: "The part of HOTA for keeping each person under one number.",
+        meaning: "The association part of HOTA: how well each person keeps one ID.",
         of: |s| s.ass_a,
         ..RATE
     },
     Figure {
         name: "MOTA",
         range: [f64::NEG_INFINITY, 1.0],
-        meaning: "1 less all misses, false reports and switches per person in view; may be negative.",
+        meaning: "1 minus misses, false positives and ID switches per annotated person and frame; \
+                  may be negative.",
         compared: true,
         of: |s| s.mota,
         ..RATE
     },
     Figure {
         name: "IDF1",
-        meaning: "How much of the time each person carries the same one number.",
+        meaning: "Share of the time in which each person has one and the same ID.",
         compared: true,
         of: |s| s.idf1,
         ..RATE
@@ -164,7 +164,7 @@ const FIGURES: &[Figure] = &[
     Figure {
         name: "LAMR",
         higher_is_better: false,
-        meaning: "People missed, averaged from one false report in 100 images to one in each.",
+        meaning: "Log-average miss rate, from one false positive in 100 images to one per image.",
         places: &[ComparisonSpace::Image],
         compared: true,
         of: lamr_of_enough_scores,
@@ -193,7 +193,7 @@ const FIGURES: &[Figure] = &[
         range: POSITIVE,
         decimals: 2,
         higher_is_better: false,
-        meaning: "Reports where nobody is, per frame. Counts on empty logs too.",
+        meaning: "False positives per frame. Counts on empty logs, too.",
         compared: true,
         of: |s| s.fp_per_frame,
         ..RATE
@@ -204,7 +204,7 @@ const FIGURES: &[Figure] = &[
         unit: "s",
         decimals: 2,
         higher_is_better: false,
-        meaning: "Time from coming into view to the first match; people never found do not enter.",
+        meaning: "Time from coming into view to the first match, without people who are never found.",
         places: &[ComparisonSpace::Image],
         of: |s| s.time_to_confirm_mean_s,
         ..RATE
@@ -215,7 +215,7 @@ const FIGURES: &[Figure] = &[
         unit: "s",
         decimals: 2,
         higher_is_better: false,
-        meaning: "Time that tracks spend on another person than they began with, per log.",
+        meaning: "Time in which tracks are on another person than the one they began with, per log.",
         of: |s| Some(s.wrong_person_s),
         ..RATE
     },
@@ -234,7 +234,7 @@ const FIGURES: &[Figure] = &[
         name: "OSPA",
         range: POSITIVE,
         higher_is_better: false,
-        meaning: "One distance for wrong places and wrong numbers of people.",
+        meaning: "One distance for wrong positions and a wrong number of people.",
         of: |s| s.ospa,
         ..RATE
     },

@@ -11,12 +11,12 @@ use crate::summary::Summary;
 use crate::view::OrderedBenchmark;
 
 /// Returns the text of `report.json`: one task per line in a fixed order, and the [`Summary`] under
-/// `summary`. Pictures are left out, since they belong to the page. The text can be read back as a
-/// [`Benchmark`], for instance as the baseline of a gate.
+/// `summary`. Pictures are left out, because only the page needs them. The text can be read back as
+/// a [`Benchmark`], for example as the baseline of a gate.
 ///
 /// # Errors
 ///
-/// None with the types of this crate; the error is that of the JSON writer.
+/// None with the types of this crate; the error type is that of the JSON writer.
 pub fn json(benchmark: &Benchmark) -> serde_json::Result<String> {
     let view = OrderedBenchmark::new(benchmark);
     let tasks: Vec<String> =
@@ -45,9 +45,9 @@ fn task_json(task: &TaskResult) -> serde_json::Result<String> {
     serde_json::to_string(&task)
 }
 
-/// Returns the text of `report.csv`: a header and one row per task (RFC 4180). Figures in the image
-/// begin with `image.`, those on the floor with `metres.`; figures without a meaning for a task are
-/// empty.
+/// Returns the text of `report.csv`: a header and one row per task (RFC 4180). The names of figures
+/// begin with `image.` or with `metres.` for those on the floor; figures that have no meaning for a
+/// task are empty.
 pub fn csv(benchmark: &Benchmark) -> String {
     let names = figure_names();
     let mut rows = vec![header(&names)];
@@ -56,11 +56,11 @@ pub fn csv(benchmark: &Benchmark) -> String {
 }
 
 fn figure_names() -> BTreeSet<String> {
-    // From the default, so that all names are there even if no task has the figure.
+    // All names are taken from the default, so that they are there even if no task has the figure.
     figures(&Scores::default()).keys().cloned().collect()
 }
 
-/// Returns the figures by their names.
+/// Returns the figures by name.
 pub fn figures(scores: &Scores) -> Map<String, Value> {
     match serde_json::to_value(scores) {
         Ok(Value::Object(map)) => map,

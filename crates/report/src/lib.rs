@@ -1,9 +1,9 @@
 //! Benchmark results as a self-contained web page, as JSON and as a table.
 //!
-//! A [`Benchmark`] holds one [`TaskResult`] per pipeline, log and seed. [`html`] makes a page of it
-//! that needs no network, works without JavaScript, in light and dark and on paper; [`json`] and
-//! [`csv`] are for programs. [`Summary`] holds the means and their intervals, [`compare`] lists the
-//! differences between two pipelines.
+//! A [`Benchmark`] holds one [`TaskResult`] per pipeline, log and seed. [`html`] renders it as a
+//! page that needs no network and works without JavaScript, in light and dark mode and in print;
+//! [`json`] and [`csv`] are for programs. [`Summary`] holds the means and their intervals,
+//! [`compare`] lists the differences between two pipelines.
 //!
 //! ```
 //! use tagalong_report::{Benchmark, TaskResult, html};
@@ -16,9 +16,9 @@
 //!
 //! # Why times are kept apart
 //!
-//! Everything in a [`Benchmark`] follows from configs, logs and seeds, so the files made from it
-//! are the same bytes on every machine and in every run. [`Timings`] are not, so they are a file of
-//! their own, and the page shows them only if the machine was otherwise idle.
+//! Everything in a [`Benchmark`] follows from configs, logs and seeds, so its files have the same
+//! bytes on every machine and in every run. [`Timings`] do not, so they are a separate file, and
+//! the page shows them only if the machine was otherwise idle.
 
 mod chart;
 mod compare;

@@ -6,36 +6,36 @@ use tagalong_eval::{Consistency, CurvePoint, Event, EventKind, Repaired, Scores}
 /// Results of a benchmark: pipelines x logs x seeds.
 ///
 /// The contents do not depend on the machine or on the number of tasks that ran at once: the same
-/// inputs give the same bytes. Times are kept apart, in [`Timings`].
+/// inputs give the same bytes. Times are stored separately, in [`Timings`].
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Benchmark {
     /// Version of Tagalong that ran the tasks.
     pub version: String,
     /// Results, one per task, in any order.
     pub tasks: Vec<TaskResult>,
-    /// Names of logs that go back to one recording, as copies that `tagalong alter` makes; means and
-    /// intervals count each of them as a log of its own.
+    /// Groups of logs that come from one recording, for example copies made with `tagalong alter`;
+    /// means and intervals count each of them as a separate log.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub copies: Vec<Vec<String>>,
-    /// Notes on the logs and their truth, as signs that a truth is that of another log.
+    /// Notes on the logs and their truth, for example that a truth seems to belong to another log.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
-    /// Moments in which people were missed, with their images; for the page alone.
+    /// Moments in which people were missed, with their images; only for the page.
     #[serde(skip)]
     pub moments: Vec<Moment>,
 }
 
-/// Says that logs go back to one recording, so that intervals over logs are too narrow.
+/// Returns a note that logs come from one recording, so that intervals over logs are too narrow.
 pub fn copies_note(logs: &[String]) -> String {
     format!(
-        "{} go back to one recording, as copies of `tagalong alter` do, but count as {} independent logs: \
-         the intervals are too narrow and the p-values too small",
+        "{} come from one recording, such as copies of `tagalong alter`, but count as {} \
+         independent logs: the intervals are too narrow and the p-values too small",
         logs.join(" and "),
         logs.len()
     )
 }
 
-/// Moment in which a person was missed, with all that the pipelines made of it.
+/// Moment in which a person was missed, with the results of all pipelines.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Moment {
     /// Name of the log.
@@ -48,30 +48,31 @@ pub struct Moment {
     pub size: [u32; 2],
     /// The whole image, JPEG in base64.
     pub image_jpeg_base64: String,
-    /// People that count: number and box (left, top, width, height), pixels.
+    /// People that count: ID and box (left, top, width, height), pixels.
     pub people: Vec<(i64, [f64; 4])>,
-    /// Tracks of each pipeline: number and box.
+    /// Tracks of each pipeline: ID and box.
     pub tracks: BTreeMap<String, Vec<(i64, [f64; 4])>>,
 }
 
-/// Person whom a pipeline missed in one frame.
+/// Person that a pipeline missed in one frame.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct MissedPerson {
     /// 1-based index of the frame.
     pub frame: u64,
-    /// Id of the person in the truth.
+    /// ID of the person in the truth.
     pub person: i64,
-    /// Test that dropped the candidate at this person; of several the one that comes last, because
-    /// it let the candidate come nearest. None for another cause.
+    /// Test that dropped the candidate at this person. If several candidates were dropped, it is
+    /// the latest test, because that candidate came closest to a detection. `None` for another
+    /// cause.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub test: Option<String>,
     /// Box of that candidate, pixels: left, top, width, height.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub box_px: Option<[f64; 4]>,
-    /// Name of a cause that is no test, for example `no depth`.
+    /// Name of a cause other than a test, for example `no depth`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub other_cause: Option<String>,
-    /// Position of the sentence in [`TaskResult::causes`].
+    /// Index of the sentence in [`TaskResult::causes`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cause: Option<usize>,
 }
@@ -86,16 +87,16 @@ impl MissedPerson {
 /// Result of one pipeline on one log with one seed.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct TaskResult {
-    /// Name of the pipeline: the file name of its config without ending.
+    /// Name of the pipeline: the file name of its config without extension.
     pub pipeline: String,
-    /// Name of the log: its file name without ending.
+    /// Name of the log: its file name without extension.
     pub log: String,
     /// Seed of the pipeline.
     pub seed: u64,
     /// Content hash of everything that the result depends on, in hex; the key into
     /// [`Timings::tasks`].
     pub hash: String,
-    /// Inputs of the hash: the kind (`config`, `log`, `truth`) and the SHA-256 of each, in hex.
+    /// Inputs of the hash: kind (`config`, `log`, `truth`) and SHA-256 of each, in hex.
     #[serde(default)]
     pub inputs: BTreeMap<String, String>,
     /// Outcome of the task.
@@ -106,14 +107,14 @@ pub struct TaskResult {
     pub duration_s: f64,
     /// True if part of the log was lost or could not be used.
     pub data_lost: bool,
-    /// True if nothing is tracked over the frames of the log: figures over time mean nothing.
+    /// True if the frames are not tracked over time; figures over time then have no meaning.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub single_frames: bool,
     /// Figures in the image (IoU), if the truth has boxes.
     pub image: Option<Scores>,
     /// Figures on the floor (metres), if the truth has positions.
     pub metres: Option<Scores>,
-    /// Miss rate over false positives per image; empty without boxes.
+    /// Curve of the miss rate against false positives per image; empty without boxes.
     #[serde(default)]
     pub lamr_curve: Vec<CurvePoint>,
     /// Consistency of the filter's covariance with its innovations, if it reports any.
@@ -127,22 +128,22 @@ pub struct TaskResult {
     /// People that count on the floor, in the same frame.
     #[serde(default)]
     pub truth: Vec<Trajectory>,
-    /// Events, in the order of time.
+    /// Events, in chronological order.
     #[serde(default)]
     pub events: Vec<EventRow>,
-    /// People missed by frame: in the image, or on the floor where the truth has no boxes.
+    /// Missed people by frame: in the image, or on the floor if the truth has no boxes.
     #[serde(default)]
     pub missed: Vec<MissedPerson>,
-    /// Figures with one kind of error repaired, by boxes if the truth has them.
+    /// Figures with one kind of error repaired, with boxes if the truth has them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub repairs: Vec<Repaired>,
-    /// Lines of the config that decide the tests that dropped missed people, by test.
+    /// Lines of the config that set the tests that dropped missed people, by test.
     #[serde(default)]
     pub deciding: BTreeMap<String, Vec<String>>,
-    /// Sentences that say why people are missed, by test or other cause.
+    /// Sentences that explain why people were missed, by test or other cause.
     #[serde(default)]
     pub reasons: BTreeMap<String, String>,
-    /// Sentences that say why a person was missed in a frame, with the tracks.
+    /// Sentences that explain why a person was missed in a frame, with the tracks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub causes: Vec<String>,
 }
@@ -159,56 +160,56 @@ pub enum Outcome {
         /// Error message.
         why: String,
     },
-    /// The task was not started, because the log lacks an input of the pipeline, or its figures say
-    /// nothing, because a detector has no model or is for another kind of camera.
+    /// The task was not started, because the log lacks an input of the pipeline, or because its
+    /// figures would have no meaning: a detector has no model or is for another kind of camera.
     Skipped {
         /// Missing input or model.
         why: String,
     },
 }
 
-/// Test and the number of candidates it dropped.
+/// Test, and the number of candidates that it dropped.
 #[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 pub struct Dropped {
     /// Name of the test.
     pub test: String,
-    /// Number of candidates dropped by it.
+    /// Number of candidates that the test dropped.
     pub count: u64,
 }
 
 /// Positions of a person or a track on the floor over time.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Trajectory {
-    /// Id of the person or of the track.
+    /// ID of the person or of the track.
     pub id: i64,
-    /// Time since the first frame of the log in seconds, then x and y in the
-    /// odometry frame in metres (x ahead of the robot as it started, y left).
+    /// Time since the first frame of the log in seconds, then x and y in the odometry frame in
+    /// metres (x forward from the robot's initial pose, y left).
     pub points: Vec<[f64; 3]>,
 }
 
-/// Event of a recording that is worth a look.
+/// Event of a recording that deserves a closer look.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct EventRow {
     /// 1-based index of the frame in which it begins.
     pub frame: u64,
     /// Time since the first frame of the log, in seconds.
     pub t_s: f64,
-    /// `miss`, `found`, `switch`, `wrong-person`, `false-track`, or a kind of
-    /// the caller's own.
+    /// `miss`, `found`, `switch`, `wrong-person`, `false-track`, or another kind defined by the
+    /// caller.
     pub kind: String,
-    /// Id of the track, if there is one.
+    /// ID of the track, if there is one.
     pub track: Option<i64>,
-    /// Id of the person in the truth, if there is one.
+    /// ID of the person in the truth, if there is one.
     pub person: Option<i64>,
     /// Description, as a sentence.
     pub text: String,
-    /// Small image of the position, PNG in base64 (the standard alphabet).
+    /// Small image of the scene at the event, PNG in base64 (the standard alphabet).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub picture_png_base64: Option<String>,
 }
 
 impl EventRow {
-    /// Describes an event of a log with a first frame at `start_ns`; without a picture.
+    /// Creates the row of an event in a log whose first frame is at `start_ns`, without a picture.
     pub fn new(event: &Event, start_ns: i64) -> Self {
         let (kind, person, track) = match event.kind {
             EventKind::Miss { person, track } => ("miss", Some(person), track),
@@ -250,7 +251,7 @@ fn sentence(kind: &EventKind) -> String {
     }
 }
 
-/// Processing times of the tasks. A file of its own, because it is never the same twice.
+/// Processing times of the tasks, in a separate file because they differ in every run.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Timings {
     /// True if the machine was otherwise idle. If not, the times are meaningless, and the report
@@ -262,7 +263,7 @@ pub struct Timings {
     pub tasks: BTreeMap<String, TaskTiming>,
 }
 
-/// Processing times of the frames of one task, reading and decoding not included.
+/// Processing times of the frames of one task, without reading and decoding.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct TaskTiming {
     /// Median time per frame, in milliseconds.

@@ -33,8 +33,8 @@ pub struct PipelineSummary {
     pub skipped: u64,
     /// Figures by `image.NAME` or `metres.NAME`, with the names of [`tagalong_eval::Scores`].
     pub figures: BTreeMap<String, Estimate>,
-    /// Fraction of the people that were found at all, with an interval (95 %) by the spread between
-    /// logs; one seed per log, so that each person counts once.
+    /// Fraction of the people that were found in at least one frame, with a 95 % interval from the
+    /// spread between logs; one seed per log, so that each person counts once.
     pub people_found: Option<Interval>,
     /// Number of people in `people_found`.
     pub people: u64,
@@ -45,20 +45,21 @@ pub struct PipelineSummary {
 pub struct Estimate {
     /// Mean over the logs.
     pub mean: f64,
-    /// 95 % interval over logs (Student); `None` for a single log, and for logs with the same
+    /// 95 % interval over logs (Student); `None` for a single log, and if all logs have the same
     /// value.
     pub interval: Option<[f64; 2]>,
     /// Number of logs in the mean.
     pub logs: u64,
-    /// True if no other pipeline with as many logs is better, and there is another one.
+    /// True if no other pipeline with the same number of logs is better, and there is at least one
+    /// other.
     pub best: bool,
 }
 
 impl PipelineSummary {
-    /// Returns the number of people that were found in at least one frame, if there is truth.
+    /// Returns the number of people that were found in at least one frame; `None` without truth.
     pub fn people_found_count(&self) -> Option<u64> {
         let found = self.people_found.as_ref()?;
-        // The summary keeps the share; the count is recovered from it.
+        // The summary stores the fraction; the count is computed back from it.
         Some((found.estimate * self.people as f64).round() as u64)
     }
 
@@ -68,7 +69,7 @@ impl PipelineSummary {
     }
 }
 
-/// Difference of `b` from `a` in one figure, on the logs that both have.
+/// Difference between `b` and `a` in one figure, on the logs that both have.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct PairSummary {
     /// First pipeline.
@@ -81,7 +82,7 @@ pub struct PairSummary {
     pub logs: u64,
     /// Mean of `b - a`.
     pub difference: f64,
-    /// 95 % interval over logs (Student); `None` for a single log, and for logs with the same
+    /// 95 % interval over logs (Student); `None` for a single log, and if all logs have the same
     /// difference.
     pub interval: Option<[f64; 2]>,
     /// Probability of a difference this large if there were none, by the sign-flip test over logs.
@@ -91,8 +92,8 @@ pub struct PairSummary {
 }
 
 impl PairSummary {
-    /// Returns true if the corrected p-value is below 0.05, which takes six logs at least, and more
-    /// where several pairs are compared.
+    /// Returns true if the corrected p-value is below 0.05. This takes at least six logs, and more
+    /// if several pairs are compared.
     pub fn is_clear(&self) -> bool {
         is_significant(self.p_corrected)
     }
@@ -101,10 +102,9 @@ impl PairSummary {
 impl Summary {
     /// Computes the means and intervals of a benchmark.
     ///
-    /// Pipelines are compared by means over logs, not over frames, because a long log carries no
+    /// Pipelines are compared by means over logs, not over frames, because a long log contains no
     /// more information about a pipeline than a short one of another place. Failed and skipped
-    /// tasks do not enter, which is why only pipelines with the greatest number of logs can be
-    /// best.
+    /// tasks are left out, which is why only pipelines with the largest number of logs can be best.
     pub fn new(benchmark: &Benchmark) -> Self {
         let view = OrderedBenchmark::new(benchmark);
         let mut pipelines: Vec<_> = view.pipelines.iter().map(|p| pipeline(&view, p)).collect();
@@ -119,13 +119,13 @@ impl Summary {
         self.pairs.iter().filter(|pair| pair.figure == figure).count()
     }
 
-    /// Returns the entry of a pipeline.
+    /// Returns the summary of a pipeline.
     pub fn pipeline(&self, name: &str) -> Option<&PipelineSummary> {
         self.pipelines.iter().find(|p| p.pipeline == name)
     }
 }
 
-/// Returns the figure of a pipeline on each of its logs, mean over seeds.
+/// Returns the figure of a pipeline on each of its logs, as the mean over seeds.
 pub fn per_log<'a>(
     view: &OrderedBenchmark<'a>,
     pipeline: &str,
@@ -198,7 +198,8 @@ fn people(view: &OrderedBenchmark<'_>, pipeline: &str) -> Vec<[u64; 2]> {
 
 fn mark_best(pipelines: &mut [PipelineSummary], figure: &Figure, place: ComparisonSpace) {
     let key = figure.key(place);
-    // A pipeline without any detection has no false positives either; that makes it the best in nothing.
+    // A pipeline without any detection has no false positives either, but must not count as best
+    // for that.
     let finding = pipelines.iter().filter(|p| p.finds_people());
     let with: Vec<Estimate> = finding.filter_map(|p| p.figures.get(&key).copied()).collect();
     let most = with.iter().map(|e| e.logs).max().unwrap_or(0);
@@ -228,7 +229,7 @@ fn pairs(view: &OrderedBenchmark<'_>) -> Vec<PairSummary> {
     pairs
 }
 
-/// Corrects the p-values of each figure, because of many pairs some differ by chance.
+/// Corrects the p-values of each figure, because among many pairs some differ by chance.
 fn correct(pairs: &mut [PairSummary]) {
     let mut of_figure: BTreeMap<String, Vec<&mut PairSummary>> = BTreeMap::new();
     for pair in pairs {

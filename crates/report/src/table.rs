@@ -6,12 +6,12 @@ use tagalong_eval::{CONFIDENCE, Interval, clustered_share, wilson};
 pub struct Table {
     /// Title, with the table or figure of the paper.
     pub title: String,
-    /// Names of the columns after the names of the rows, with units.
+    /// Names of the columns after the column of row names, with units.
     pub columns: Vec<String>,
     /// Rows of the table.
     pub rows: Vec<Row>,
-    /// Conditions of the numbers: scenes, number of draws, meaning of the intervals, limits of the
-    /// comparison.
+    /// Conditions of the numbers: scenes, number of draws, meaning of the intervals, and limits of
+    /// the comparison.
     pub notes: Vec<String>,
 }
 
@@ -26,38 +26,38 @@ pub struct Row {
     pub cells: Vec<Cell>,
 }
 
-/// One number, or none.
+/// One number, or an empty cell.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Cell {
-    /// The number; none if it is not known.
+    /// The number; `None` if it is not known.
     pub value: Option<f64>,
-    /// Standard deviation of the values of which the number is the mean.
+    /// Standard deviation of the values whose mean is the number.
     pub deviation: Option<f64>,
     /// Confidence interval of 95 %.
     pub interval: Option<[f64; 2]>,
-    /// Digits behind the point.
+    /// Digits after the decimal point.
     #[serde(skip)]
     pub digits: usize,
 }
 
 impl Cell {
-    /// Creates a cell of a number, shown with `digits` digits after the point.
+    /// Creates a cell with a number, shown with `digits` digits after the decimal point.
     pub fn number(value: f64, digits: usize) -> Self {
         Self { value: value.is_finite().then_some(value), digits, ..Self::default() }
     }
 
-    /// Creates a cell of mean and standard deviation; empty without values.
+    /// Creates a cell with mean and standard deviation; empty without values.
     pub fn mean(values: &[f64], digits: usize) -> Self {
         tagalong_math::mean_and_deviation(values).map_or_else(Self::default, |(mean, deviation)| {
             Self {
-                // One value does not spread.
+                // A single value has no spread.
                 deviation: (values.len() > 1).then_some(deviation),
                 ..Self::number(mean, digits)
             }
         })
     }
 
-    /// Creates a cell of an estimate with its interval, if there is one.
+    /// Creates a cell with an estimate and its interval, if there is one.
     pub fn estimate(interval: Option<Interval>, digits: usize) -> Self {
         interval.map_or_else(Self::default, |of| Self {
             interval: of.ends(),
@@ -65,21 +65,21 @@ impl Cell {
         })
     }
 
-    /// Creates a cell of `count` out of `of` in per cent, with its Wilson interval; empty if `of`
-    /// is 0. For independent samples, like one result per draw.
+    /// Creates a cell with `count` out of `of` in per cent, and its Wilson interval; empty if `of`
+    /// is 0. For independent samples, such as one result per draw.
     pub fn share(count: u64, of: u64, digits: usize) -> Self {
         // Two digits more, because `percent` removes two.
         Self::estimate(wilson(count, of, CONFIDENCE), digits + 2).percent()
     }
 
-    /// Returns all of these `[count, of]` in per cent, with the interval by the spread
-    /// between clusters, like the frames of a draw.
+    /// Creates a cell with the sum of these `[count, of]` in per cent, and the interval from the
+    /// spread between clusters, such as the frames of a draw.
     pub fn clustered(clusters: &[[u64; 2]], digits: usize) -> Self {
         Self::estimate(clustered_share(clusters), digits + 2).percent()
     }
 
-    /// Cuts the interval to the range of values that the number can have: Student's interval of a
-    /// share may reach beyond 1.
+    /// Cuts the interval to the range of possible values, because Student's interval of a fraction
+    /// may reach beyond 1.
     #[must_use]
     pub fn within(self, least: f64, most: f64) -> Self {
         let interval = self.interval.map(|[lower, upper]| [lower.max(least), upper.min(most)]);
@@ -169,7 +169,7 @@ impl Table {
         out + if self.notes.is_empty() { "" } else { "\n" }
     }
 
-    /// Returns header and rows, as texts.
+    /// Returns header and rows as texts.
     fn lines(&self) -> Vec<Vec<String>> {
         let header = std::iter::once(String::new()).chain(self.columns.iter().cloned());
         let rows = self.rows.iter().map(|row| {

@@ -4,7 +4,7 @@ use crate::figures::{ComparisonSpace, MAIN};
 use crate::model::{Benchmark, Outcome, TaskResult};
 use crate::summary::Summary;
 
-/// Benchmark in an order that does not depend on the way its tasks were run.
+/// Benchmark in an order that does not depend on the order in which its tasks were run.
 pub struct OrderedBenchmark<'a> {
     pub version: &'a str,
     /// Tasks by pipeline, log, seed and hash.
@@ -12,7 +12,7 @@ pub struct OrderedBenchmark<'a> {
     /// Pipelines by name, or best first once they are [ranked](Self::ranked).
     pub pipelines: Vec<&'a str>,
     pub logs: Vec<&'a str>,
-    /// Logs that go back to one recording.
+    /// Groups of logs that come from one recording.
     pub copies: &'a [Vec<String>],
     /// Notes on the logs and their truth.
     pub notes: &'a [String],
@@ -35,15 +35,15 @@ impl<'a> OrderedBenchmark<'a> {
         }
     }
 
-    /// Puts the pipelines in the order of their main figure, best first; those with fewer logs after
-    /// those with more, because their means may be of the easier ones.
+    /// Sorts the pipelines by their main figure, best first. Those with fewer logs come after those
+    /// with more, because their means may be those of the easier logs.
     pub fn ranked(mut self, summary: &Summary) -> Self {
         let place = ComparisonSpace::ALL.into_iter().find(|place| {
             summary.pipelines.iter().any(|p| p.figures.contains_key(&MAIN.key(*place)))
         });
         let Some(place) = place else { return self };
         let key = MAIN.key(place);
-        // The sort is stable, so that equal ones stay in the order of their names.
+        // The sort is stable, so that equal ones stay sorted by name.
         self.pipelines.sort_by(|a, b| {
             let [a, b] = [a, b].map(|name| {
                 let estimate = summary.pipeline(name).and_then(|it| it.figures.get(&key));

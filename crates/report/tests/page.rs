@@ -349,7 +349,7 @@ fn the_verdict_of_a_pair_allows_for_the_other_pairs() {
     let needed = "With 6 logs and 3 pairs no difference can be clear: 7 logs are needed.";
     assert!(three.contains(needed) && three.contains("With 3 pairs that takes 7 logs at least."));
     assert!(!two.contains("can be clear") && two.contains("With 1 pair that takes 6 logs"));
-    assert!(three.contains("it can leave out 0 beside"));
+    assert!(three.contains("it can exclude 0 beside"));
 }
 
 /// Returns where each text begins in the page.

@@ -177,13 +177,13 @@ fn parse_head(bytes: &[u8]) -> Result<Request, Response> {
     for line in lines {
         let (name, value) = line.split_once(':').ok_or_else(|| wrong("a header has no colon"))?;
         if name.is_empty() || !name.bytes().all(is_name) || value.contains(['\r', '\n']) {
-            return Err(wrong("a header has a name or a value that is none"));
+            return Err(wrong("a header has an invalid name or value"));
         }
         let name = name.to_ascii_lowercase();
         // Two of them could be read in two ways.
         let is_single = matches!(name.as_str(), "host" | "content-length" | "origin");
         if is_single && headers.iter().any(|(other, _)| *other == name) {
-            return Err(wrong("a header is there twice"));
+            return Err(wrong("a header occurs twice"));
         }
         headers.push((name, value.trim().to_owned()));
         if headers.len() > HEADERS {
@@ -197,13 +197,13 @@ fn parse_head(bytes: &[u8]) -> Result<Request, Response> {
 
 fn body_length(request: &Request, most: usize) -> Result<usize, Response> {
     if request.header("transfer-encoding").is_some() {
-        return Err(Response::refusal(411, "send the length of the body"));
+        return Err(Response::refusal(411, "the length of the body is missing"));
     }
     let Some(text) = request.header("content-length") else { return Ok(0) };
     // `parse` alone would take a plus sign.
     let is_number = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
     if !is_number {
-        return Err(Response::refusal(400, "the length of the body is no number"));
+        return Err(Response::refusal(400, "the length of the body is not a number"));
     }
     match text.parse::<usize>() {
         Ok(length) if length <= most => Ok(length),

@@ -194,11 +194,11 @@ impl Guard {
     fn check_method(&self, request: &Request, is_change: bool) -> Result<(), Response> {
         if !is_change {
             let is_read = request.is_read();
-            let refusal = Response::refusal(405, "GET and POST are all there is");
+            let refusal = Response::refusal(405, "only GET and POST are supported");
             return if is_read { Ok(()) } else { Err(refusal) };
         }
         if self.changes == Changes::Refused {
-            return Err(Response::refusal(405, "there is nothing to change here"));
+            return Err(Response::refusal(405, "nothing can be changed here"));
         }
         let kind = request.header("content-type").unwrap_or_default();
         match kind.split(';').next().map(str::trim) {

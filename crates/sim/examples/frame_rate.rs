@@ -1,6 +1,6 @@
-//! Prints the processor time that an image of each camera takes, and how many a second are rendered on
-//! one thread and on two, with a digest of the images and the truth: a change that only makes them
-//! faster keeps it.
+//! Prints the processor time that an image of each camera takes, and how many images per second are
+//! rendered on one thread and on two, with a digest of the images and the truth: a change that only
+//! makes them faster does not change the digest.
 //!
 //! ```sh
 //! cargo run --release -p tagalong-sim --example frame_rate
@@ -13,9 +13,10 @@ use std::time::Instant;
 use cpu_time::ProcessTime;
 use tagalong_sim::{Event, Scene, Shot, Simulation};
 
-/// Images of a scene that are rendered.
+/// Number of images of a scene that are rendered.
 const SHOTS: usize = 10;
-/// Rounds, of which the fastest counts: other work on the machine only slows one down.
+/// Number of rounds, of which the fastest counts, because other load on the machine only slows one
+/// down.
 const ROUNDS: usize = 2;
 
 const RGBD: &str = "crowd = 5\nseed = 6\n[room]\nsize_m = [12.0, 8.0]\nclutter = 6\n";

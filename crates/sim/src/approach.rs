@@ -1,4 +1,4 @@
-//! A person or a trolley that comes at the robot and does not avoid it.
+//! A person or a trolley that moves towards the robot and does not avoid it.
 
 use nalgebra::{Isometry2, Point2, Point3, Rotation2, Rotation3, Vector2, Vector3};
 use schemars::JsonSchema;
@@ -12,42 +12,43 @@ use crate::world::Object;
 
 /// Half the width of a person, m.
 const BODY_M: f64 = 0.2;
-/// Nearest and farthest start from the robot, m.
+/// Minimum and maximum distance of the start from the robot, m.
 const DISTANCE_M: [f64; 2] = [2.0, 6.0];
-/// Distance to the robot's middle at which it stands still, because it touches the robot, m.
+/// Distance to the middle of the robot at which the approacher stops, because it touches the robot,
+/// m.
 const TOUCHES_M: f64 = 0.2;
-/// It keeps this far away from walls, m.
+/// Minimum distance from walls, m.
 const WALL_M: f64 = 0.35;
-/// It keeps this far away from the middle of other people, m.
+/// Minimum distance from the middle of other people, m.
 const PERSON_M: f64 = 0.45;
-/// Step of the bearing where the room leaves no place at the wanted one, degrees.
+/// Step of the bearing if there is no room at the wanted one, degrees.
 const BEARING_STEP_DEG: f64 = 5.0;
-/// The body of a trolley is this far above the floor, on wheels, m.
+/// Height of a trolley's body above the floor, on wheels, m.
 const WHEELS_M: f64 = 0.08;
 
 settings! {
-    /// An approach: a person or a trolley appears near the robot and walks or rolls at it.
+    /// An approach: a person or a trolley appears near the robot and moves towards it.
     pub struct ApproachSettings {
-        /// Kind of the approacher.
+        /// Kind of the approacher: `person` or `trolley`.
         pub by: ApproachBy = ApproachBy::Person,
-        /// Time at which it appears and sets out, s.
+        /// Time at which it appears and starts to move, s.
         #[schemars(range(min = 0.0, max = 86_400.0))]
         pub start_s: f64 = 2.0,
-        /// Direction from the robot to its start, degrees, from the robot's heading at that time to
-        /// the left. The nearest direction with enough room is taken where a wall is too near.
+        /// Direction from the robot to its start, degrees, to the left of the robot's heading at
+        /// that time. If a wall is too near, the nearest direction with enough room is taken.
         #[schemars(range(min = -360.0, max = 360.0))]
         pub bearing_deg: f64 = 0.0,
-        /// Time in which it would reach a robot at rest, s: the speed times this is the distance of
-        /// its start, within 2 to 6 m.
+        /// Time in which it would reach a robot at rest, s. The speed times this is the distance of
+        /// its start, limited to 2 to 6 m.
         #[schemars(range(min = 0.1, max = 60.0))]
         pub lead_s: f64 = 3.0,
         /// Speed, m/s.
         #[schemars(range(min = 0.05, max = 2.0))]
         pub speed_mps: f64 = 1.0,
-        /// It turns to the robot all the time; otherwise it keeps the direction in which the robot
-        /// was at the start.
+        /// If true, it always turns to the robot; otherwise it keeps the direction to the robot's
+        /// position at the start.
         pub aims: bool = true,
-        /// Body height of a person, m; by chance if left out.
+        /// Body height of a person, m; random if left out.
         #[schemars(range(min = 0.8, max = 2.2))]
         pub height_m: Option<f64>,
         /// Length, width and height of a trolley, m.
@@ -74,7 +75,7 @@ impl ApproachSettings {
         (self.speed_mps * self.lead_s).clamp(DISTANCE_M[0], DISTANCE_M[1])
     }
 
-    /// Returns the time after which the approacher has reached a robot that stayed at rest, s.
+    /// Returns the time at which the approacher reaches a robot at rest, s.
     pub fn arrives_s(&self) -> f64 {
         self.start_s + self.distance_m() / self.speed_mps
     }
@@ -83,15 +84,15 @@ impl ApproachSettings {
 /// State of the approacher at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ApproachState {
-    /// Free distance between the robot and the approacher, m; negative is contact.
+    /// Free distance between the robot and the approacher, m; negative means contact.
     pub gap_m: f64,
-    /// Direction of the approacher in the robot frame, to the left positive, rad.
+    /// Direction of the approacher in the robot frame, rad, positive to the left.
     pub bearing_rad: f64,
-    /// Speed over ground, m/s; 0 once it stands.
+    /// Speed over ground, m/s; 0 once it has stopped.
     pub speed_mps: f64,
 }
 
-/// Sensors in whose field of view the approacher is, and which nothing hides it from.
+/// Sensors that can see the approacher: it is in their field of view and not hidden.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ApproachInView {
     /// The camera, within the range of its depth.
@@ -108,14 +109,14 @@ enum Phase {
     Stands,
 }
 
-/// The approacher on its way.
+/// The moving approacher.
 #[derive(Clone, Debug)]
 pub struct Approacher {
     settings: ApproachSettings,
     phase: Phase,
     /// Position, m.
     pub place: Point2<f64>,
-    /// Direction of its front, rad.
+    /// Heading, rad.
     pub heading_rad: f64,
 }
 
@@ -127,12 +128,12 @@ pub struct Surroundings<'a> {
     pub room_m: [f64; 2],
     /// Furniture.
     pub obstacles: &'a [Obstacle],
-    /// Places of the other people.
+    /// Positions of the other people.
     pub people: Vec<Point2<f64>>,
 }
 
 impl Approacher {
-    /// Creates an approacher that waits for its time.
+    /// Creates an approacher that has not appeared yet.
     pub fn new(settings: &ApproachSettings) -> Self {
         Self {
             settings: settings.clone(),
@@ -142,22 +143,22 @@ impl Approacher {
         }
     }
 
-    /// Returns its kind.
+    /// Returns the kind of the approacher.
     pub fn by(&self) -> ApproachBy {
         self.settings.by
     }
 
-    /// Returns true once it is in the room.
+    /// Returns true once the approacher is in the room.
     pub fn is_there(&self) -> bool {
         self.phase != Phase::Waits
     }
 
-    /// Returns its speed over ground, m/s.
+    /// Returns the speed over ground, m/s.
     pub fn speed_mps(&self) -> f64 {
         if let Phase::Comes(_) = self.phase { self.settings.speed_mps } else { 0.0 }
     }
 
-    /// Appears, if it is time.
+    /// Places the approacher in the room when it is time.
     pub fn appear(&mut self, now_s: f64, around: &Surroundings<'_>) {
         if self.phase != Phase::Waits || now_s < self.settings.start_s {
             return;
@@ -168,8 +169,8 @@ impl Approacher {
         self.heading_rad = way.y.atan2(way.x);
     }
 
-    /// Returns the place in the room that is nearest to the wanted bearing and far enough away from
-    /// the robot.
+    /// Returns the position in the room that is nearest to the wanted bearing and far enough away
+    /// from the robot.
     fn start(&self, around: &Surroundings<'_>) -> Point2<f64> {
         let wanted_m = self.settings.distance_m();
         let heading_rad = around.robot.rotation.angle();
@@ -195,7 +196,7 @@ impl Approacher {
         best.1
     }
 
-    /// Moves on by a short time.
+    /// Moves the approacher by a time step.
     pub fn step(&mut self, dt: f64, around: &Surroundings<'_>) {
         let Phase::Comes(ahead) = self.phase else { return };
         let robot = Point2::from(around.robot.translation.vector);
@@ -208,12 +209,13 @@ impl Approacher {
         let wanted = self.place + way * (self.settings.speed_mps * dt);
         let place = within(wanted, around.room_m);
         self.heading_rad = way.y.atan2(way.x);
-        // A wall ends the way of an approacher that missed the robot.
+        // An approacher that missed the robot ends at a wall.
         self.phase = if place == wanted { Phase::Comes(way) } else { Phase::Stands };
         self.place = self.outside(place, around);
     }
 
-    /// Returns a place moved out of furniture and other people: it goes along their edges.
+    /// Returns a position moved out of furniture and other people, so that it slides along their
+    /// edges.
     fn outside(&self, place: Point2<f64>, around: &Surroundings<'_>) -> Point2<f64> {
         let half_m = match self.settings.by {
             ApproachBy::Person => 0.0,
@@ -232,7 +234,7 @@ impl Approacher {
         place
     }
 
-    /// Returns the distance of its surface from a point, m; negative inside.
+    /// Returns the distance of the approacher's surface from a point, m; negative inside.
     pub fn distance_m(&self, point: &Point2<f64>) -> f64 {
         let away = point - self.place;
         match self.settings.by {
@@ -246,7 +248,7 @@ impl Approacher {
         }
     }
 
-    /// Returns the solids of a trolley that stands on a floor of this height, m.
+    /// Returns the solids of a trolley on a floor of this height, m.
     pub fn trolley(&self, floor_m: f64) -> Object {
         let [length, width, height] = self.settings.size_m;
         let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), self.heading_rad);
@@ -265,12 +267,13 @@ impl Approacher {
     }
 }
 
-/// Returns the place in a room that is nearest to a point, some way off the walls.
+/// Returns the position nearest to a point that keeps the distance from the walls.
 fn within(point: Point2<f64>, room_m: [f64; 2]) -> Point2<f64> {
     Point2::new(off_walls(point.x, room_m[0]), off_walls(point.y, room_m[1]))
 }
 
-/// Returns the coordinate nearest to one that is some way off the walls of a side of a room, m.
+/// Returns the coordinate nearest to this one that keeps the distance from the walls along one side
+/// of a room, m.
 fn off_walls(at_m: f64, side_m: f64) -> f64 {
     at_m.clamp(WALL_M.min(0.5 * side_m), (side_m - WALL_M).max(0.5 * side_m))
 }

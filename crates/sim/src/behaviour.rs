@@ -1,5 +1,5 @@
-//! Behaviour of people: they walk along their ways, keep off each other and off furniture, and some
-//! of them play tricks when the robot cannot see them.
+//! Behaviour of people: they walk along their paths and avoid each other and furniture, and some of
+//! them perform tricks when the robot cannot see them.
 
 use crate::obstacle::Obstacle;
 use nalgebra::{Point2, Rotation2, Vector2};
@@ -13,47 +13,47 @@ use crate::scene::{AtEnd, PersonSettings, Trick};
 
 mod react;
 
-/// Largest change of a walker's velocity, m/s².
+/// Maximum acceleration of a walker, m/s².
 const MAX_ACCELERATION: f64 = 1.2;
-/// Largest turn rate of a body, rad/s.
+/// Maximum turn rate of a body, rad/s.
 const MAX_TURN: f64 = 2.6;
 /// A point of the path is reached at this distance, m.
 const REACHED_M: f64 = 0.25;
-/// Distance from a waypoint, m, at which a walker gives it up if an object blocks the way.
+/// Distance from a waypoint, m, at which a walker skips it if an obstacle blocks the way.
 const NEAR_ENOUGH_M: f64 = 1.0;
-/// Strength, m/s², and reach, m, of the push between people (Helbing & Molnár
-/// 1995, with the reach of indoor crowds).
+/// Strength, m/s², and range, m, of the repulsion between people (Helbing & Molnár 1995, with the
+/// range of indoor crowds).
 const PUSH: f64 = 2.2;
 const PUSH_REACH_M: f64 = 0.45;
-/// Reach of the push away from things, m: people pass close to door jambs.
+/// Range of the repulsion from obstacles, m: people pass close to door jambs.
 const THING_REACH_M: f64 = 0.18;
-/// Detour around an object. A walker that makes so little headway, as a part of their speed, for so
-/// long, s, and so near to its surface, m, is blocked; they go round it for some time, s, so much
-/// to the side, rad.
+/// Detour around an obstacle. A walker is blocked if the progress, as a fraction of the speed, is
+/// this low for this time, s, this close to the surface of the obstacle, m. The walker then goes
+/// around it for some time, s, at this angle to the side, rad.
 const HEADWAY: f64 = 0.3;
 const HELD_UP_S: f64 = 0.6;
 const HELD_UP_M: f64 = 0.7;
 const ROUND_S: f64 = 2.0;
 const ROUND_RAD: f64 = 1.4;
 /// Bending of a person with the posture [`Posture::Bending`]: in the second half of each period, s,
-/// by this angle, rad, within some time, s.
+/// by this angle, rad, which takes some time, s.
 const BEND_EVERY_S: f64 = 6.0;
 const BEND_RAD: f64 = 1.1;
 const BEND_TAKES_S: f64 = 0.4;
-/// Time in which a seated person gets up, s, and the bend of their trunk on the way, rad.
+/// Time that a seated person needs to get up, s, and the bend of the trunk meanwhile, rad.
 const GETS_UP_S: f64 = 1.8;
 const GETS_UP_BEND_RAD: f64 = 0.7;
-/// Speed below which a walker counts as standing and leaves the avoiding to the others, m/s.
+/// Speed below which a walker counts as standing and leaves the avoidance to the others, m/s.
 const STANDS_MPS: f64 = 0.1;
-/// Companions come no nearer to each other than about this, m.
+/// Approximate minimum distance between companions, m.
 const TOO_NEAR_M: f64 = 0.6;
-/// Time in which a companion closes a gap to their place, s.
+/// Time in which a companion closes the gap to the wanted position, s.
 const CATCH_UP_S: f64 = 0.8;
 
-/// Wanted place and motion of a companion.
+/// Wanted position and motion of a companion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lead {
-    /// Place beside the leader, m.
+    /// Position beside the leader, m.
     pub place: Point2<f64>,
     /// Velocity of the leader, m/s.
     pub velocity: Vector2<f64>,
@@ -61,26 +61,26 @@ pub struct Lead {
     pub heading_rad: f64,
 }
 
-/// A person on the way.
+/// A simulated person on the way.
 #[derive(Clone, Debug)]
 pub struct Walker {
     /// Size and appearance.
     pub person: Person,
-    /// Where they are and how they stand.
+    /// Position and pose.
     pub stance: Stance,
     /// Leader of a companion, and the offset in the leader's axes, m.
     pub beside: Option<(usize, Vector2<f64>)>,
     settings: PersonSettings,
-    /// Clothes under a coat that is not taken off yet.
+    /// Clothes under a coat that has not been taken off yet.
     under_coat: Option<Outfit>,
     velocity: Vector2<f64>,
-    /// Index into the path of the point ahead; past its end on arrival.
+    /// Index of the next point of the path; past its end on arrival.
     ahead: usize,
     waits_until_s: f64,
     tricked: bool,
-    /// Time for which an object has blocked the walker, s.
+    /// Time for which an obstacle has blocked the walker, s.
     held_up_s: f64,
-    /// Points on the way round blocks to the point ahead, which is the last of them.
+    /// Points of the way around blocks to the next point of the path, which is the last of them.
     turns: Vec<Point2<f64>>,
 }
 
@@ -140,7 +140,7 @@ impl Walker {
         }
     }
 
-    /// Makes this walker a companion of walker `leader`, at `offset` in the axes of that person, m.
+    /// Makes this walker a companion of the walker `leader`, at `offset` in that person's axes, m.
     pub fn along(mut self, leader: (usize, &Self), offset: Vector2<f64>) -> Self {
         let (index, leader) = leader;
         self.stance.place = leader.place_beside(offset);
@@ -149,18 +149,18 @@ impl Walker {
         self
     }
 
-    /// Whether they are in the room.
+    /// Returns true if the person is in the room.
     pub fn is_there(&self, now_s: f64) -> bool {
         now_s >= self.settings.enters_s && self.settings.leaves_s.is_none_or(|end_s| now_s < end_s)
     }
 
-    /// The points of the way.
+    /// Returns the points of the path.
     #[cfg(test)]
     pub fn points(&self) -> Vec<Point2<f64>> {
         self.settings.path.iter().map(|point| Point2::from(*point)).collect()
     }
 
-    /// Returns the place at which a companion should be.
+    /// Returns the position at which a companion should be.
     pub fn lead(&self, offset: Vector2<f64>) -> Lead {
         let heading_rad = self.stance.heading_rad;
         Lead { place: self.place_beside(offset), velocity: self.velocity, heading_rad }
@@ -170,8 +170,8 @@ impl Walker {
         self.stance.place + Rotation2::new(self.stance.heading_rad) * offset
     }
 
-    /// Moves by a short time. `keep_off` are the places of all people that are no companions;
-    /// `lead` is the place of a companion.
+    /// Moves the walker by a time step. `keep_off` are the positions of all people other than
+    /// companions; `lead` is the wanted position of a companion.
     pub fn step(
         &mut self,
         now_s: f64,
@@ -188,7 +188,7 @@ impl Walker {
             None => self.round(self.wanted(), dt, obstacles),
         };
         let mut change = (wanted - self.velocity) / 0.5;
-        // A standing person lets the others do the avoiding.
+        // A standing person leaves the avoidance to the others.
         if wanted != Vector2::zeros() {
             change +=
                 keep_off.iter().map(|p| self.push(p, 0.6, PUSH_REACH_M)).sum::<Vector2<f64>>();
@@ -208,7 +208,7 @@ impl Walker {
         self.finish_step(now_s, dt, lead);
     }
 
-    /// Moves the body of a walker that has taken a step.
+    /// Updates the body of a walker after a step.
     fn finish_step(&mut self, now_s: f64, dt: f64, lead: Option<&Lead>) {
         self.get_up(now_s);
         self.take_off_coat(now_s);
@@ -217,8 +217,8 @@ impl Walker {
         self.bend(now_s, dt);
     }
 
-    /// Returns the wanted velocity or, if an object blocks the walker, one that leads round it,
-    /// past the side that is nearer.
+    /// Returns the wanted velocity or, if an obstacle blocks the walker, one that leads around its
+    /// nearer side.
     fn round(&mut self, wanted: Vector2<f64>, dt: f64, obstacles: &[Obstacle]) -> Vector2<f64> {
         let nearest = obstacles
             .iter()
@@ -244,7 +244,7 @@ impl Walker {
         }
     }
 
-    /// Places a walker whose steps are decided elsewhere; the legs move at this speed.
+    /// Places a walker whose motion is computed elsewhere; the legs move at this speed.
     pub fn carry(&mut self, place: Point2<f64>, heading_rad: f64, speed_mps: f64, dt: f64) {
         self.velocity = Rotation2::new(heading_rad) * Vector2::new(speed_mps, 0.0);
         self.stance.place = place;
@@ -253,7 +253,8 @@ impl Walker {
         self.stride(dt);
     }
 
-    /// Moves the walker out of obstacles, because pushes of others must not lead through them.
+    /// Moves the walker out of obstacles, because the repulsion of others must not push through
+    /// them.
     fn stay_outside(&mut self, obstacles: &[Obstacle]) {
         for obstacle in obstacles {
             let away = self.stance.place - obstacle.at;
@@ -264,7 +265,7 @@ impl Walker {
         }
     }
 
-    /// The velocity that closes the gap to the place beside the leader.
+    /// Returns the velocity that closes the gap to the position beside the leader.
     fn follow(&self, lead: &Lead) -> Vector2<f64> {
         let gap = lead.place - self.stance.place;
         if lead.velocity.norm() < 0.1 && gap.norm() < 0.15 {
@@ -273,7 +274,7 @@ impl Walker {
         (lead.velocity + gap / CATCH_UP_S).cap_magnitude(1.3 * self.settings.speed_mps)
     }
 
-    /// Rises from the seat in time for the way; the feet stay where they are.
+    /// Rises from the seat in time to leave; the feet stay in place.
     fn get_up(&mut self, now_s: f64) {
         if self.settings.path.len() < 2 || self.stance.seated == 0.0 {
             return;
@@ -296,7 +297,7 @@ impl Walker {
         self.stance.bend_rad += (goal - self.stance.bend_rad) * (dt / BEND_TAKES_S).min(1.0);
     }
 
-    /// Goes on to the next point of the path where one is within this distance, m.
+    /// Advances to the next point of the path if the current one is within this distance, m.
     fn look_ahead(&mut self, now_s: f64, near_m: f64) {
         let path = &self.settings.path;
         let is_reached = path
@@ -317,7 +318,7 @@ impl Walker {
         }
     }
 
-    /// From here back along the path.
+    /// Reverses the path from the current position.
     fn reverse(&mut self) {
         let left = self.settings.path.len().saturating_sub(self.ahead);
         self.settings.path.reverse();
@@ -334,7 +335,7 @@ impl Walker {
         let way = Point2::from(*goal) - self.stance.place;
         let last =
             self.ahead + 1 == self.settings.path.len() && self.settings.at_end == AtEnd::Stop;
-        // Brakes in time for the end, and slows down while facing elsewhere.
+        // Brakes in time for the end, and slows down while facing in another direction.
         let speed = if last {
             self.settings.speed_mps.min(1.2 * way.norm())
         } else {
@@ -344,8 +345,8 @@ impl Walker {
         way.try_normalize(1e-6).unwrap_or_default() * speed * (1.0 - 0.7 * (off / 1.5).min(1.0))
     }
 
-    /// Returns the push away from a place, stronger from ahead than from behind, with a part to the
-    /// right so that people pass each other when they meet head-on.
+    /// Returns the repulsion from a position. It is stronger from ahead than from behind, and has a
+    /// component to the right so that people pass each other when they meet head-on.
     fn push(&self, from: &Point2<f64>, radius_m: f64, reach_m: f64) -> Vector2<f64> {
         let away = self.stance.place - from;
         let distance = away.norm();
@@ -422,13 +423,13 @@ impl Walker {
     }
 }
 
-/// Returns the place at which a companion should be; `None` for other walkers.
+/// Returns the wanted position of a companion; `None` for other walkers.
 pub fn lead_of(walkers: &[Walker], i: usize) -> Option<Lead> {
     walkers[i].beside.map(|(leader, offset)| walkers[leader].lead(offset))
 }
 
-/// Returns the places that a walker avoids: those of all people in the room outside of their own
-/// group, and of members of the group that come too near.
+/// Returns the positions that a walker avoids: those of all people in the room outside of the
+/// walker's group, and of members of the group that come too close.
 pub fn others(walkers: &[Walker], i: usize, now_s: f64) -> Vec<Point2<f64>> {
     let own = walkers[i].stance.place;
     let mut places = Vec::new();
@@ -443,13 +444,14 @@ pub fn others(walkers: &[Walker], i: usize, now_s: f64) -> Vec<Point2<f64>> {
     places
 }
 
-/// Returns the index of the walker that leads the group of a walker, or its own.
+/// Returns the index of the leader of a walker's group, or that of the walker.
 fn leader_of(walkers: &[Walker], i: usize) -> usize {
     walkers[i].beside.map_or(i, |(leader, _)| leader)
 }
 
-/// Returns the walker that hides each walker, seen from a place: the middle of the hidden body lies
-/// behind a walker at least 0.3 m nearer, 0.2 m to either side of whose middle count as body.
+/// Returns the walker that hides each walker, seen from this position: the middle of the hidden
+/// body is behind a walker who is at least 0.3 m nearer, and whose body is taken to extend 0.2 m to
+/// either side.
 pub fn hidden_by(walkers: &[Walker], seen_from: &Point2<f64>) -> Vec<Option<usize>> {
     fn hides(near: (f64, f64), far: (f64, f64)) -> bool {
         near.0 + 0.3 < far.0 && angle_between(near.1, far.1).abs() < (0.2 / near.0.max(0.3)).atan()
@@ -463,7 +465,7 @@ pub fn hidden_by(walkers: &[Walker], seen_from: &Point2<f64>) -> Vec<Option<usiz
     polar.iter().map(|far| polar.iter().position(|near| hides(*near, *far))).collect()
 }
 
-/// `a - b`, within half a turn.
+/// Returns `a - b`, normalised to half a turn.
 fn angle_between(a: f64, b: f64) -> f64 {
     (a - b).sin().atan2((a - b).cos())
 }

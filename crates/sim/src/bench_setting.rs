@@ -1,4 +1,4 @@
-//! Table of a scene by the rules of Follow-Bench.
+//! Table of a scene that follows Follow-Bench.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -10,22 +10,22 @@ use crate::crowd::Walk;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum BenchSetting {
-    /// A crowd on a circle, each on the way to the opposite point and back.
+    /// A crowd on a circle; each person walks to the opposite point and back.
     #[default]
     Circular,
-    /// People on their way to and fro in a corridor.
+    /// People that walk back and forth in a corridor.
     Corridor,
-    /// People on their way through a crossing of two corridors.
+    /// People that walk through a crossing of two corridors.
     Crossing,
-    /// People on their way through a wide doorway, in the direction of the target.
+    /// People that walk through a wide doorway, in the direction of the target.
     Doorway,
-    /// Obstacles in a room, and people on their way between random points.
+    /// Obstacles in a room, and people that walk between random points.
     Clutter,
 }
 
 settings! {
-    /// Scene by the rules of Follow-Bench: it sets the room, the blocks, the people, and the start
-    /// and the footprint of the robot. The first person is the target.
+    /// Scene that follows Follow-Bench: it sets the room, the blocks, the people, and the start and
+    /// the footprint of the robot. The first person is the target.
     pub struct FollowBench {
         /// Layout.
         pub setting: BenchSetting = BenchSetting::Circular,
@@ -39,14 +39,14 @@ settings! {
         /// Number of obstacles of the clutter.
         #[schemars(range(max = 40))]
         pub obstacles: usize = 20,
-        /// Way of walking of all people.
+        /// Walking model of all people.
         pub walk: Walk = Walk::Orca,
     }
 }
 
 impl FollowBench {
-    /// Returns the conditions on the settings, each with the message for a violation; a scene is
-    /// empty if it has neither people nor blocks of its own.
+    /// Returns the conditions on the settings, each with the message for a violation. A scene is
+    /// `is_empty` if it has neither people nor blocks of its own.
     pub(crate) fn rules(&self, is_empty: bool) -> [(bool, &'static str); 1] {
         [(
             is_empty,

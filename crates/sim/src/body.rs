@@ -1,4 +1,4 @@
-//! Bodies: how large the parts are and where the joints are while walking.
+//! Bodies: the sizes of their parts and the positions of their joints while walking.
 //!
 //! Segment lengths are fractions of the body height (Drillis & Contini 1966, as
 //! in Winter, "Biomechanics and Motor Control of Human Movement").
@@ -19,18 +19,18 @@ const ANKLE: f64 = 0.039;
 const FOOT: f64 = 0.143;
 const UPPER_ARM: f64 = 0.188;
 const FOREARM: f64 = 0.152;
-/// From the middle to the shoulder joint: the half width of 0.1295 less the
+/// Distance from the middle to the shoulder joint: half the shoulder width, 0.1295, minus the
 /// thickness of the arm.
 const SHOULDER: f64 = 0.106;
-/// From the middle to the hip joint.
+/// Distance from the middle to the hip joint.
 const HIP: f64 = 0.052;
-/// Arms hang this far away from the body, rad.
+/// Angle between the hanging arms and the body, rad.
 const ARMS_OUT_RAD: f64 = 0.11;
 
 /// Joints of a seated person: thighs forward, hands on them.
 const SEATED: LimbAngles =
     LimbAngles { hip: 1.45, knee: 1.45, ankle: 0.0, shoulder: 0.25, elbow: 0.9 };
-/// An arm that holds a phone in front of the chest.
+/// Joint angles of an arm that holds a phone in front of the chest.
 const PHONE_ARM: (f64, f64) = (0.45, 1.9);
 /// Angle by which the head is bowed over a phone, rad.
 const PHONE_NOD_RAD: f64 = 0.4;
@@ -38,54 +38,54 @@ const PHONE_NOD_RAD: f64 = 0.4;
 /// The size of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Build {
-    /// From the floor to the top of the head, m.
+    /// Height from the floor to the top of the head, m.
     pub height_m: f64,
-    /// Widths as a multiple of the ordinary ones.
+    /// Widths as a multiple of the average ones.
     pub breadth: f64,
 }
 
 impl Build {
-    /// A body of the population: height N(1.70, 0.09) m, breadth within 12 %.
+    /// Creates a body of the population: height N(1.70, 0.09) m, breadth within 12 %.
     pub fn random(random: &mut Random) -> Self {
-        // Clamped to sizes that the proportions still fit.
+        // Clamped to sizes for which the proportions still hold.
         let height_m = (1.70 + 0.09 * random.normal()).clamp(1.45, 2.0);
         Self { height_m, breadth: random.between(0.88, 1.12) }
     }
 }
 
-/// Place and pose of a body.
+/// Position and pose of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stance {
-    /// On the floor, m.
+    /// Position on the floor, m.
     pub place: Point2<f64>,
     /// Direction of the face, rad from X towards Y.
     pub heading_rad: f64,
-    /// Over ground, m/s.
+    /// Speed over ground, m/s.
     pub speed_mps: f64,
     /// Phase of the walking cycle, 0 to 1.
     pub phase: f64,
     /// Posture of the body.
     pub posture: Posture,
-    /// Part of the way down to a seat: 0 stands, 1 sits.
+    /// Fraction of the way down to a seat: 0 for standing, 1 for sitting.
     pub seated: f64,
     /// Forward bend of the trunk in addition to that of walking, rad.
     pub bend_rad: f64,
 }
 
 impl Stance {
-    /// Creates an upright person.
+    /// Creates the stance of an upright person.
     pub fn standing(place: Point2<f64>, heading_rad: f64) -> Self {
         let posture = Posture::Upright;
         Self { place, heading_rad, speed_mps: 0.0, phase: 0.0, posture, seated: 0.0, bend_rad: 0.0 }
     }
 }
 
-/// The joints of a body in the world, m. Pairs are left, right.
+/// The joints of a body in the world, m. Pairs are ordered left, right.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Skeleton {
     /// Posture of the body.
     pub posture: Posture,
-    /// Part of the way down to a seat.
+    /// Fraction of the way down to a seat.
     pub seated: f64,
     /// Middle between the hip joints.
     pub pelvis: Point3<f64>,
@@ -95,9 +95,9 @@ pub struct Skeleton {
     pub head: Point3<f64>,
     /// Axes of pelvis, thorax and head: X forward, Y left, Z up.
     pub world_from_pelvis: Rotation3<f64>,
-    /// As above.
+    /// Axes of the thorax.
     pub world_from_thorax: Rotation3<f64>,
-    /// As above.
+    /// Axes of the head.
     pub world_from_head: Rotation3<f64>,
     /// Shoulder joints.
     pub shoulders: [Point3<f64>; 2],
@@ -118,7 +118,7 @@ pub struct Skeleton {
 }
 
 impl Skeleton {
-    /// Returns the joints that pose networks know, by their names in the keypoints of COCO.
+    /// Returns the joints that pose networks detect, by their names in the keypoints of COCO.
     pub fn joints(&self) -> [(&'static str, Point3<f64>); 12] {
         [
             ("left_shoulder", self.shoulders[0]),
@@ -136,7 +136,7 @@ impl Skeleton {
         ]
     }
 
-    /// Returns the same body on a floor that is higher by so much, m.
+    /// Returns the same body on a floor that is higher by `by_m`, m.
     pub fn raised(mut self, by_m: f64) -> Self {
         let pairs = [
             &mut self.shoulders,
@@ -153,7 +153,7 @@ impl Skeleton {
         self
     }
 
-    /// The joints of a body in a stance.
+    /// Computes the joints of a body in a stance.
     pub fn new(build: &Build, stance: &Stance) -> Self {
         let h = build.height_m;
         let gait = Gait::new(h, stance.speed_mps);
@@ -212,7 +212,7 @@ impl Skeleton {
         self.wrists[side] = self.elbows[side] + lower * (FOREARM * h);
     }
 
-    /// The leg from its joint angles, its ankle moved forward by `plant_m`.
+    /// Places a leg according to its joint angles, with its ankle moved forward by `plant_m`.
     fn place_leg(
         &mut self,
         side: usize,
@@ -227,7 +227,7 @@ impl Skeleton {
         let hip = self.pelvis + self.world_from_pelvis * out;
         let ahead = (THIGH * limb.hip.sin() + SHANK * shank.sin()) * h + plant_m;
         let below = (THIGH * limb.hip.cos() + SHANK * shank.cos()) * h;
-        // The angles of the model do not know the floor exactly.
+        // The angles of the model do not reach the floor exactly.
         let (knee, ankle) = leg(ahead, below.min(hip.z - ANKLE * h), h);
         let [knee, ankle] = [knee, ankle].map(|(x, down)| hip + yaw * Vector3::new(x, 0.0, -down));
         // A foot near the floor lies flat on it.
@@ -245,25 +245,25 @@ impl Skeleton {
     }
 }
 
-/// Height of the hips as a fraction of the body height; the shanks stay upright.
+/// Returns the height of the hips as a fraction of the body height; the shanks stay upright.
 fn hip_height(seated: f64) -> f64 {
     ANKLE + SHANK + THIGH * (seated * SEATED.hip).cos()
 }
 
-/// Returns how far the feet are ahead of the hips, m.
+/// Returns the distance of the feet in front of the hips, m.
 pub fn feet_ahead_m(build: &Build, seated: f64) -> f64 {
     THIGH * build.height_m * (seated * SEATED.hip).sin()
 }
 
-/// Returns the angle by which the face looks down.
+/// Returns the angle by which the face is turned down, rad.
 fn nod_rad(stance: &Stance) -> f64 {
     let phone = if stance.posture == Posture::Phone { PHONE_NOD_RAD } else { 0.0 };
     0.9 * stance.bend_rad + phone
 }
 
-/// The joints of one side in a posture.
+/// Returns the joint angles of one side in a posture.
 fn held(walking: LimbAngles, side: usize, stance: &Stance) -> LimbAngles {
-    // Arms hang down from a trunk that is bent.
+    // The arms of a bent trunk hang down.
     let hanging = LimbAngles { shoulder: walking.shoulder + 1.2 * stance.bend_rad, ..walking };
     let upright = match stance.posture {
         Posture::Phone if side == 1 => {
@@ -274,13 +274,13 @@ fn held(walking: LimbAngles, side: usize, stance: &Stance) -> LimbAngles {
     upright.mix(&SEATED, stance.seated)
 }
 
-/// Knee and ankle (ahead of the hip, below it) of a leg whose ankle shall be
-/// there; an ankle out of reach is lifted, and knees bend forward.
+/// Returns knee and ankle (forward of the hip, below it) of a leg whose ankle should be at this
+/// position. An ankle out of reach is lifted, and knees bend forward.
 fn leg(ahead: f64, below: f64, h: f64) -> ((f64, f64), (f64, f64)) {
     let thigh = THIGH * h;
     let shank = SHANK * h;
     let reach = thigh + shank;
-    // Some of the reach is left for the height of the hip.
+    // Some of the length is needed for the height of the hip.
     let ahead = ahead.clamp(-0.9 * reach, 0.9 * reach);
     let below = below.min((reach * reach - ahead * ahead).sqrt());
     let distance = ahead.hypot(below).max(1.0001 * (thigh - shank).abs());

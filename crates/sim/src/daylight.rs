@@ -1,4 +1,4 @@
-//! Windows, the sky in them, and the sun.
+//! Windows, the sky behind them, and the sun.
 
 use nalgebra::{Point3, Rotation3, Vector3};
 use tagalong_core::settings;
@@ -14,27 +14,27 @@ const SILL_M: f64 = 0.85;
 const TOP_M: f64 = 2.15;
 /// Width of a window with its frame and some wall, m.
 const LEAST_PITCH_M: f64 = 1.6;
-/// Distance of the sun, m: far enough for parallel beams.
+/// Distance of the sun, m: far enough for parallel rays.
 const SUN_M: f64 = 1000.0;
 
 settings! {
-    /// Windows along the left wall of a room (at the far end of Y), evenly spread, and the light of
-    /// the day in them. They shine in a camera's face, and where the sun falls images are white and
-    /// structured light measures nothing.
+    /// Windows along the left wall of a room (at the far end of Y), evenly spaced, and the daylight
+    /// in them. They can dazzle the camera, and in sunlight images are white and structured light
+    /// measures nothing.
     pub struct Daylight {
         /// Number of windows.
         pub windows: usize = 3,
-        /// Brightness of the sky in them, as the illuminance of a white surface, lx.
+        /// Brightness of the sky, given as the illuminance of a white surface, lx.
         #[schemars(range(min = 0.0, max = 50_000.0))]
         pub sky_lux: f64 = 3000.0,
-        /// Illuminance of a surface that faces the sun, lx; 0 is an overcast day.
+        /// Illuminance of a surface that faces the sun, lx; 0 for an overcast day.
         #[schemars(range(min = 0.0, max = 130_000.0))]
         pub sun_lux: f64 = 20_000.0,
-        /// Direction of the sun from straight out of the windows towards the far end of the room,
+        /// Azimuth of the sun, from straight out of the windows towards the far end of the room,
         /// degrees.
         #[schemars(range(min = -80.0, max = 80.0))]
         pub azimuth_deg: f64 = 20.0,
-        /// Height of the sun above the horizon, degrees.
+        /// Elevation of the sun above the horizon, degrees.
         #[schemars(range(min = 2.0, max = 80.0))]
         pub elevation_deg: f64 = 30.0,
     }
@@ -49,7 +49,7 @@ impl Daylight {
         )]
     }
 
-    /// Returns the panes, bright as the sky, with their frames before the wall of a room.
+    /// Returns the panes, as bright as the sky, with their frames in front of the wall of a room.
     pub(crate) fn windows(&self, room: &RoomSettings) -> Object {
         let openings = Windows::of(self.windows, room);
         let pane = Material::plain([0.85, 0.93, 1.0]).with_infrared(0.0).glowing(self.sky_lux);
@@ -91,9 +91,9 @@ impl Daylight {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Windows {
     count: usize,
-    /// From the middle of a window to that of the next, m.
+    /// Distance between the middles of neighbouring windows, m.
     pitch_m: f64,
-    /// Place of the wall along Y, m.
+    /// Position of the wall along Y, m.
     wall_m: f64,
     top_m: f64,
 }
@@ -105,12 +105,12 @@ impl Windows {
         Self { count, pitch_m: long / count as f64, wall_m: wide, top_m }
     }
 
-    /// Returns the place of a window along the wall, m.
+    /// Returns the position of the middle of a window along the wall, m.
     fn middle(&self, number: usize) -> f64 {
         (number as f64 + 0.5) * self.pitch_m
     }
 
-    /// Returns true if a way from the sun comes through a window.
+    /// Returns true if a ray from the sun passes through a window.
     #[inline(always)]
     pub fn are_open(&self, sun: &Point3<f64>, way: &Vector3<f64>) -> bool {
         let at = sun + way * ((self.wall_m - sun.y) / way.y);

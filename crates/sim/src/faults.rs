@@ -1,4 +1,4 @@
-//! Faults inside a ride: sensors, odometry, clock and wheels that fail at a given time.
+//! Faults during a ride: sensors, odometry, clock and wheels that fail at a given time.
 
 use std::fmt;
 use std::str::FromStr;
@@ -11,9 +11,9 @@ use crate::camera_settings::CameraKind;
 use crate::random::Random;
 use crate::scene::Scene;
 
-/// First stream of random numbers of the faults; each fault has its own.
+/// First stream of random numbers for the faults; each fault has its own.
 const FIRST_STREAM: u64 = 64;
-/// Parts of the scene between which a drawn fault begins.
+/// Fractions of the scene between which a random fault begins.
 const DRAWN_BETWEEN: [f64; 2] = [0.2, 0.6];
 
 /// Kind of an injected fault.
@@ -85,7 +85,7 @@ pub enum FaultKind {
     EnableStuck,
 }
 
-/// Part of the robot that a fault needs.
+/// Part of the robot that a fault concerns.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Part {
     Any,
@@ -165,7 +165,7 @@ impl FaultKind {
         }
     }
 
-    /// Returns true if the robot of a scene has the part that the fault breaks.
+    /// Returns true if the robot of a scene has the part that the fault concerns.
     pub fn applies_to(self, scene: &Scene) -> bool {
         match self.part() {
             Part::Any => true,
@@ -175,8 +175,8 @@ impl FaultKind {
         }
     }
 
-    /// Returns true for a fault that a seed may draw: a ride in which the robot is switched off tells
-    /// nothing of its other faults.
+    /// Returns true for a fault that may be drawn at random: a ride in which the robot is switched
+    /// off shows nothing about its other faults.
     fn is_drawn(self) -> bool {
         self != Self::EnableStuck
     }
@@ -196,7 +196,7 @@ impl FaultKind {
         }
     }
 
-    /// Returns the share where none is given; 0 for kinds without one.
+    /// Returns the share if none is given; 0 for kinds without one.
     fn usual_share(self) -> f64 {
         match self {
             Self::DarkColumns => 0.12,
@@ -206,7 +206,7 @@ impl FaultKind {
         }
     }
 
-    /// Returns the size where none is given; 0 for kinds without one.
+    /// Returns the size if none is given; 0 for kinds without one.
     fn usual_size(self) -> f64 {
         match self {
             Self::NoiseDepth | Self::OdometryWrong => 0.5,
@@ -220,7 +220,7 @@ impl FaultKind {
         }
     }
 
-    /// Returns the least and the largest size that makes sense; `None` for kinds without one.
+    /// Returns the minimum and the maximum plausible size; `None` for kinds without one.
     fn sizes(self) -> Option<[f64; 2]> {
         match self {
             Self::NoiseDepth => Some([0.0, 10.0]),
@@ -254,8 +254,8 @@ impl FromStr for FaultKind {
     }
 }
 
-/// Fault that is injected into a scene: a `[[faults.inject]]` section. What is left out, the seed
-/// draws.
+/// Fault that is injected into a scene: a `[[faults.inject]]` section. Values that are left out are
+/// drawn at random by the seed.
 ///
 /// ```
 /// use tagalong_sim::{FaultKind, InjectedFault, Scene};
@@ -268,30 +268,30 @@ impl FromStr for FaultKind {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct InjectedFault {
-    /// Kind of the fault; left out, the seed draws one that the robot can have.
+    /// Kind of the fault; if left out, the seed draws one that the robot can have.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kind: Option<FaultKind>,
-    /// Time at which it begins, s; left out, the seed draws one.
+    /// Time at which it begins, s; if left out, the seed draws one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at_s: Option<f64>,
-    /// Time for which it lasts, s; left out, to the end of the scene.
+    /// Duration, s; if left out, to the end of the scene.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lasts_s: Option<f64>,
-    /// Share that the kind speaks of, 0 to 1; left out, that of the kind.
+    /// Share as used by the kind, 0 to 1; if left out, the default of the kind.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub share: Option<f64>,
-    /// Size in the unit of the kind; left out, that of the kind.
+    /// Size in the unit of the kind; if left out, the default of the kind.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size: Option<f64>,
 }
 
 impl InjectedFault {
-    /// Creates a fault of a kind, at a time that the seed draws.
+    /// Creates a fault of this kind, at a time that the seed draws.
     pub fn new(kind: FaultKind) -> Self {
         Self { kind: Some(kind), ..Self::default() }
     }
 
-    /// Creates a fault of which the seed draws kind and time.
+    /// Creates a fault whose kind and time the seed draws.
     pub fn random() -> Self {
         Self::default()
     }
@@ -302,7 +302,7 @@ impl InjectedFault {
         Self { at_s: Some(at_s), ..self }
     }
 
-    /// Returns the fault with the time for which it lasts, s.
+    /// Returns the fault with its duration, s.
     #[must_use]
     pub fn lasting(self, lasts_s: f64) -> Self {
         Self { lasts_s: Some(lasts_s), ..self }
@@ -364,9 +364,9 @@ impl InjectedFault {
         Some(format!("faults.inject: {kind} needs {part}"))
     }
 
-    /// Returns the fault with all that the seed draws.
+    /// Returns the fault with all values that the seed draws.
     fn scheduled(&self, scene: &Scene, mut random: Random) -> ScheduledFault {
-        // Drawn always, so that a given time leaves the drawn kind as it is.
+        // Always drawn, so that giving a time does not change the drawn kind.
         let able =
             FaultKind::ALL.into_iter().filter(|kind| kind.is_drawn() && kind.applies_to(scene));
         let able: Vec<FaultKind> = able.collect();
@@ -423,14 +423,14 @@ pub struct ScheduledFault {
     /// Time at which it ends, s; infinite for the end of the scene.
     #[serde(serialize_with = "finite")]
     pub to_s: f64,
-    /// Share that the kind speaks of.
+    /// Share as used by the kind.
     pub share: f64,
     /// Size in the unit of the kind.
     pub size: f64,
 }
 
 impl ScheduledFault {
-    /// Returns true while the fault is there.
+    /// Returns true while the fault is present.
     pub fn is_active(&self, at_s: f64) -> bool {
         self.from_s <= at_s && at_s < self.to_s
     }
@@ -443,13 +443,13 @@ impl fmt::Display for ScheduledFault {
     }
 }
 
-/// Writes a time; an infinite one as none, which JSON has no number for.
+/// Serialises a time; an infinite one becomes none, because JSON has no number for it.
 fn finite<S: serde::Serializer>(seconds: &f64, serializer: S) -> Result<S::Ok, S::Error> {
     seconds.is_finite().then_some(*seconds).serialize(serializer)
 }
 
 impl Scene {
-    /// Returns true if the robot has further sensors of obstacles.
+    /// Returns true if the robot has further obstacle sensors.
     fn has_obstacle_sensors(&self) -> bool {
         !(self.lasers.is_empty() && self.ranges.is_empty() && self.bumpers.is_empty())
     }
@@ -462,10 +462,10 @@ impl Scene {
             .collect()
     }
 
-    /// Refuses faults that cannot be injected into this scene.
+    /// Rejects faults that cannot be injected into this scene.
     ///
     /// # Errors
-    /// The value that is wrong, with the remedy.
+    /// A message with the wrong value and the remedy.
     pub fn check_faults(&self) -> Result<(), String> {
         let problem = self.faults.inject.iter().find_map(|fault| fault.problem(self));
         problem.map_or(Ok(()), Err)

@@ -1,7 +1,7 @@
-//! Version of what the simulator gives for a scene and a seed.
+//! Version of the output of the simulator for a scene and a seed.
 
-/// Version of simulated figures: tables that were printed with another one are stale. It rises with
-/// each change of images, paths or odometry, of which the test below tells.
+/// Version of simulated figures: tables that were printed with another version are stale. It
+/// increases with each change of images, paths or odometry, which the test below detects.
 pub const FIGURES_VERSION: u32 = 1;
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
-//! Scenes of Follow-Bench, a benchmark of robots that follow a person among people: H. Ye et al.,
+//! Scenes of Follow-Bench, a benchmark for robots that follow a person among people: H. Ye et al.,
 //! Follow-Bench: A unified motion planning benchmark for socially-aware robot person following,
-//! arXiv 2509.10796. Layouts and speeds are those of the published scenes; the places of people and
-//! obstacles are drawn by the seed.
+//! arXiv 2509.10796. Layouts and speeds are those of the published scenes; the positions of people
+//! and obstacles are drawn by the seed.
 
 use std::f64::consts::{PI, TAU};
 
@@ -15,23 +15,23 @@ use crate::scene::{AtEnd, PersonSettings, Scene};
 
 /// Radius of the circle on which a circular crowd stands, m.
 const CIRCLE_M: f64 = 5.0;
-/// Distance along the circle between neighbours, at least, m.
+/// Minimum distance between neighbours along the circle, m.
 const BESIDE_M: f64 = 0.7;
-/// Distance between people at the start, and from their points to blocks, at least, m.
+/// Minimum distance between people at the start, and from their points to blocks, m.
 const APART_M: f64 = 0.8;
 const OFF_BLOCK_M: f64 = 0.6;
-/// Gap between obstacles of the clutter, through which people and the robot pass, m.
+/// Gap between obstacles of the clutter, wide enough for people and the robot, m.
 const BETWEEN_M: f64 = 1.6;
 /// Thickness of the walls of a corridor, and of the wall with the doorway, m.
 const SIDE_M: f64 = 2.2;
 const DOOR_WALL_M: f64 = 0.4;
 /// Sides of the obstacles of the clutter, m.
 const OBSTACLE_M: [f64; 2] = [0.75, 2.0];
-/// Points that a person of the clutter walks to in turn.
+/// Number of points to which a person in the clutter walks in turn.
 const GOALS: usize = 20;
-/// Places that are tried before the last one is taken.
+/// Number of positions that are tried before the last one is taken.
 const TRIES: usize = 1000;
-/// Outline of the robot of the benchmark, m.
+/// Outline of the benchmark's robot, m.
 const FOOTPRINT_M: [[f64; 2]; 4] = [[0.35, 0.275], [-0.35, 0.275], [-0.35, -0.275], [0.35, -0.275]];
 /// Distance of the robot behind the target at the start, m.
 const BEHIND_M: f64 = 1.3;
@@ -54,7 +54,7 @@ impl Scene {
     }
 }
 
-/// Maker of one scene.
+/// Builder of one scene.
 struct Maker {
     bench: FollowBench,
     random: Random,
@@ -65,14 +65,14 @@ struct Maker {
 type Area = [[f64; 2]; 2];
 
 impl Maker {
-    /// Sets the room, the target on its way and the robot behind it.
+    /// Sets the room, the path of the target and the robot behind it.
     fn start(&mut self, size_m: [f64; 2], target: [[f64; 2]; 2], walk: (f64, f64)) {
         let (safe_distance_m, reached_m) = walk;
         let [from, to] = target;
         let scene = &mut self.scene;
         scene.room.size_m = size_m;
         scene.reacting = CrowdSettings { safe_distance_m, reached_m, ..CrowdSettings::default() };
-        // In the direction of the corridor or across the doorway, like the published scenes.
+        // Along the corridor or through the doorway, as in the published scenes.
         let is_along = (to[0] - from[0]).abs() > (to[1] - from[1]).abs();
         let ahead = if is_along { [BEHIND_M, 0.0] } else { [0.0, BEHIND_M] };
         scene.robot.start = [from[0] - ahead[0], from[1] - ahead[1]];
@@ -97,12 +97,13 @@ impl Maker {
         self.bench.width_m.unwrap_or(usual_m)
     }
 
-    /// Returns a random point of an area that is off blocks.
+    /// Returns a random point of an area that is not in a block.
     fn point(&mut self, area: &Area) -> [f64; 2] {
         self.point_that(area, |_, _| true)
     }
 
-    /// Returns a random point of an area that is off blocks, and away from the start of all others.
+    /// Returns a random point of an area that is not in a block and not near the start of anyone
+    /// else.
     fn start_point(&mut self, area: &Area) -> [f64; 2] {
         self.point_that(area, |scene, point| {
             let starts = scene.people.iter().map(|person| person.path[0]);
@@ -131,8 +132,8 @@ impl Maker {
 
         self.start([30.0, 30.0], [[8.0, 15.0], [28.0, 15.0]], (0.5, 2.0));
         let people = self.bench.people;
-        // Uniform on the circle under the condition that neighbours are apart: the rest of the
-        // circle is shared out at random, and then the gaps are put in.
+        // Uniform on the circle under the condition that neighbours keep the distance: the rest of
+        // the circle is divided at random, and then the gaps are inserted.
         let apart_rad = BESIDE_M.min(TAU * CIRCLE_M / people.max(1) as f64) / CIRCLE_M;
         let rest_rad = TAU - apart_rad * people as f64;
         let turn_rad = self.random.between(0.0, TAU);
@@ -198,7 +199,7 @@ impl Maker {
         }
         let target = [5.0, 16.0].map(|y| [self.random.between(10.0, 31.0), y]);
         self.start([40.0, 20.0], target, (0.4, 1.0));
-        // Across the doorway, whatever the way along the wall is.
+        // Through the doorway, whatever the motion along the wall is.
         let [x, y] = self.scene.people[0].path[0];
         self.scene.robot.start = [x, y - BEHIND_M];
         self.scene.robot.heading_deg = 90.0;
@@ -223,7 +224,7 @@ impl Maker {
                 is_off && keep_free.iter().all(|free| distance_m(*free, point) > reach_m + 1.0)
             });
             let place = Point2::from(at);
-            // No place is left where the tries ended at one that is too near to another block.
+            // If the last try is too near to another block, the obstacle is left out.
             if self.scene.blocks.iter().all(|block| block.gap_m(&place) > reach_m) {
                 self.add_block(at, size_m);
             }

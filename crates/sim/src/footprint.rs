@@ -4,14 +4,15 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Isometry2, Point2, Vector2};
 
-/// Radius of a robot without a footprint, m: somewhat more than the robot of the papers, which is
-/// 0.38 m wide and 0.47 m long.
+/// Radius of a robot without a footprint, m: slightly more than that of the robot in the papers,
+/// which is 0.38 m wide and 0.47 m long.
 pub const ROBOT_RADIUS_M: f64 = 0.25;
-/// A bumper is pressed by what is this near to the body, m: it stands out from it.
+/// Distance from the body within which an object presses the bumper, m, because the bumper stands
+/// out.
 const BUMPER_M: f64 = 0.02;
-/// Most corners of a footprint.
+/// Maximum number of corners of a footprint.
 const MOST_CORNERS: usize = 64;
-/// Farthest corner of a footprint, m.
+/// Maximum distance of a corner of a footprint, m.
 const FARTHEST_M: f64 = 3.0;
 
 /// Outline of the robot around the point between its wheels.
@@ -23,7 +24,7 @@ pub(crate) enum Outline<'a> {
     Polygon(&'a [[f64; 2]]),
 }
 
-/// Free distance from the outline to something, m; negative inside of it.
+/// Free distance between the outline and an object, m; negative inside of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Gap {
     /// Direction from the middle of the robot, robot frame, rad.
@@ -33,8 +34,8 @@ pub(crate) struct Gap {
 }
 
 impl Outline<'_> {
-    /// Returns the gap to a round thing so far away in a direction of the world; a point has the
-    /// radius 0.
+    /// Returns the gap to a round object at this distance and direction in the world; a point has
+    /// the radius 0.
     pub fn gap(
         &self,
         world_from_robot: &Isometry2<f64>,
@@ -55,7 +56,8 @@ impl Outline<'_> {
 }
 
 impl Gap {
-    /// Returns true if it presses a bumper that covers an arc, degrees, from the right to the left.
+    /// Returns true if the object presses a bumper that covers this arc, degrees, from right to
+    /// left.
     pub fn presses(&self, arc_deg: [f64; 2]) -> bool {
         let [from, to] = arc_deg.map(f64::to_radians);
         let from_first = (self.bearing_rad - from).rem_euclid(TAU);
@@ -90,7 +92,7 @@ fn signed_distance(corners: &[[f64; 2]], point: &Point2<f64>) -> f64 {
         let turn = end.y.atan2(end.x) - start.y.atan2(start.x);
         turned_rad += (turn + PI).rem_euclid(TAU) - PI;
     }
-    // The corners go all the way around a point inside, and not at all around one outside.
+    // Around a point inside, the corners make a whole turn; around one outside, none.
     if turned_rad.abs() > PI { -nearest_m } else { nearest_m }
 }
 

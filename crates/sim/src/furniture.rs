@@ -1,4 +1,4 @@
-//! Kinds of furniture, and where pieces stand.
+//! Kinds of furniture, and positions of the pieces.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 pub struct Furniture {
     /// Kind of furniture.
     pub kind: FurnitureKind,
-    /// Where it stands, m.
+    /// Position, m.
     pub at: [f64; 2],
-    /// Where its front looks, degrees.
+    /// Heading of its front, degrees.
     #[serde(default)]
     pub heading_deg: f64,
 }
@@ -32,7 +32,7 @@ pub enum FurnitureKind {
     Pillar,
     /// A sheet on a panel that shows a person.
     Poster,
-    /// A person cut out of cardboard.
+    /// A cardboard cut-out of a person.
     CardboardFigure,
     /// A desk with a monitor.
     Desk,
@@ -42,7 +42,7 @@ pub enum FurnitureKind {
     Chair,
     /// A round bin on a small table.
     BinOnTable,
-    /// A wall of 2.4 m across its heading with an open doorway in its middle.
+    /// A wall of 2.4 m across its heading, with an open doorway in its middle.
     Doorway,
     /// A screen of 1.6 m x 1.7 m across its heading.
     Partition,
@@ -50,7 +50,7 @@ pub enum FurnitureKind {
     Blanket,
     /// A flag that hangs from a pole.
     Flag,
-    /// A door of frosted glass, from which no projected dots return.
+    /// A door of frosted glass, which does not return projected dots.
     GlassDoor,
     /// A large mirror in a frame on the floor, which faces its heading.
     Mirror,
@@ -59,7 +59,7 @@ pub enum FurnitureKind {
 }
 
 impl FurnitureKind {
-    /// Its name in tables.
+    /// Returns the name of the kind in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::CoatStand => "coat stand",

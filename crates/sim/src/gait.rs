@@ -6,12 +6,12 @@ use std::f64::consts::TAU;
 /// Leg length as a fraction of the body height (thigh and shank).
 const LEG: f64 = 0.491;
 
-/// Phases in which a foot lies flat on the floor, and one between them at which
-/// the joint angles are left alone.
+/// Phases in which a foot is flat on the floor, and one between them at which the joint angles are
+/// not corrected.
 const FLAT: [f64; 2] = [0.06, 0.44];
 const MID_STANCE: f64 = 0.25;
 
-/// The gait of a body of some height at some speed.
+/// The gait of a body of this height at this speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gait {
     leg_m: f64,
@@ -19,38 +19,38 @@ pub struct Gait {
     relative_speed: f64,
 }
 
-/// Where the pelvis is in relation to smooth motion, and how it is turned.
+/// Motion of the pelvis relative to smooth motion.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct PelvisMotion {
-    /// Ahead of the smooth motion, m.
+    /// Forward of the smooth motion, m.
     pub forward_m: f64,
     /// To the left, m.
     pub left_m: f64,
     /// Upwards; never positive, m.
     pub up_m: f64,
-    /// About the vertical, the thorax turns the other way, rad.
+    /// Rotation about the vertical, rad; the thorax turns the other way.
     pub torsion_rad: f64,
-    /// Bend forward, rad.
+    /// Forward bend, rad.
     pub lean_rad: f64,
 }
 
 /// The joint angles of one side, rad; flexion is positive.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct LimbAngles {
-    /// Thigh against the vertical, forward positive.
+    /// Angle of the thigh to the vertical, forward positive.
     pub hip: f64,
     /// Bend of the knee.
     pub knee: f64,
-    /// Toes upwards positive.
+    /// Angle of the foot, positive with the toes up.
     pub ankle: f64,
-    /// Upper arm against the vertical, forward positive.
+    /// Angle of the upper arm to the vertical, forward positive.
     pub shoulder: f64,
     /// Bend of the elbow.
     pub elbow: f64,
 }
 
 impl LimbAngles {
-    /// Returns angles a part of the way from these to others.
+    /// Returns the angles at this fraction of the way from these to others.
     pub fn mix(&self, others: &Self, part: f64) -> Self {
         Self {
             hip: mixed_angle(self.hip, others.hip, part),
@@ -62,33 +62,33 @@ impl LimbAngles {
     }
 }
 
-/// Returns the angle at a part of the way between two, exact at both ends.
+/// Returns the angle at this fraction of the way between two, exact at both ends.
 fn mixed_angle(from: f64, to: f64, part: f64) -> f64 {
     from * (1.0 - part) + to * part
 }
 
 impl Gait {
-    /// The gait of a body `height_m` tall at `speed_mps`, at rest if zero. The
-    /// model ends at 2.3 leg lengths per second; faster bodies move like that.
+    /// Creates the gait of a body `height_m` tall at `speed_mps`, at rest if zero. The model ends
+    /// at 2.3 leg lengths per second; faster bodies move as at that speed.
     pub fn new(height_m: f64, speed_mps: f64) -> Self {
         let leg_m = LEG * height_m;
         // The model is fitted up to this speed.
         Self { leg_m, relative_speed: (speed_mps / leg_m).clamp(0.0, 2.3) }
     }
 
-    /// Duration of a cycle of two steps, s, in which the body covers 1.346
-    /// sqrt(RV) leg lengths; infinite at rest.
+    /// Returns the duration of a cycle of two steps, s, in which the body covers 1.346 sqrt(RV) leg
+    /// lengths; infinite at rest.
     pub fn cycle_s(&self) -> f64 {
         1.346 / self.relative_speed.sqrt()
     }
 
-    /// Fraction of the cycle that a foot is on the ground.
+    /// Returns the fraction of the cycle during which a foot is on the ground.
     pub fn support_fraction(&self) -> f64 {
         let cycle = self.cycle_s();
         if cycle.is_finite() { (0.752 * cycle - 0.143) / cycle } else { 1.0 }
     }
 
-    /// The pelvis at a phase (0 to 1, 0 is the heel strike of the left foot).
+    /// Returns the pelvis at a phase (0 to 1; 0 is the heel strike of the left foot).
     pub fn pelvis(&self, phase: f64) -> PelvisMotion {
         let rv = self.relative_speed;
         let slow = rv.min(0.5);
@@ -107,9 +107,9 @@ impl Gait {
         }
     }
 
-    /// Returns the shift of the left ankle, forward from the place that the joint angles give, at
-    /// which the flat foot stays where it is on the floor, m: the angles alone let it slide. In
-    /// between the correction goes over smoothly.
+    /// Returns the forward shift of the left ankle, relative to the position from the joint angles,
+    /// that keeps the flat foot in place on the floor, m; with the angles alone it would slide.
+    /// Between the flat phases the correction is blended smoothly.
     pub fn plant_m(&self, phase: f64) -> f64 {
         let phase = phase.rem_euclid(1.0);
         let [start, end] = FLAT;
@@ -122,21 +122,22 @@ impl Gait {
         from + (to - from) * 0.5 * (1.0 - (0.5 * TAU * part).cos())
     }
 
-    /// A planted foot goes back under the body at the body's speed.
+    /// Returns the displacement of a planted foot, which moves back under the body at the body's
+    /// speed.
     fn slide_m(&self, phase: f64) -> f64 {
         let cycle_m = 1.346 * self.relative_speed.sqrt() * self.leg_m;
         let planted = self.ankle_ahead_m(MID_STANCE) + cycle_m * (MID_STANCE - phase);
         planted - self.ankle_ahead_m(phase)
     }
 
-    /// The left ankle ahead of the smooth motion of the body.
+    /// Returns the position of the left ankle forward of the smooth motion of the body.
     fn ankle_ahead_m(&self, phase: f64) -> f64 {
         let limb = self.limb(phase);
         let leg = 0.5 * (limb.hip.sin() + (limb.hip - limb.knee).sin());
         self.pelvis(phase).forward_m + self.leg_m * leg
     }
 
-    /// The joints of the left side at a phase; the right side is half a cycle later.
+    /// Returns the joints of the left side at a phase; the right side is half a cycle later.
     pub fn limb(&self, phase: f64) -> LimbAngles {
         let rv = self.relative_speed;
         let slow = rv.min(0.5);
@@ -158,8 +159,8 @@ impl Gait {
     }
 }
 
-/// A smooth periodic function through (phase, value) points in rising order,
-/// level at each of them: the points of the paper are the extremes.
+/// Evaluates a smooth periodic function through (phase, value) points in ascending order, with
+/// slope zero at each of them: the points of the paper are the extremes.
 fn through(points: &[(f64, f64)], phase: f64) -> f64 {
     let start = points[0].0;
     let at = (phase - start).rem_euclid(1.0);

@@ -1,5 +1,5 @@
-//! The surfaces that the rays of an image meet. Neighbouring pixels of a row lie side by side, so that
-//! one instruction reads or writes several of them.
+//! Surfaces that the rays of an image hit. Neighbouring pixels of a row are stored together, so
+//! that one instruction reads or writes several of them.
 
 use crate::lanes::{LANES, Lanes};
 use crate::world::Hit;
@@ -9,27 +9,27 @@ use crate::world::Hit;
 pub struct HitImage {
     width: usize,
     height: usize,
-    /// Each row is padded with [`Hit::NOTHING`].
+    /// The last group of each row is padded with [`Hit::NOTHING`].
     groups: Vec<HitGroup>,
 }
 
-/// First surfaces of [`LANES`] neighbouring pixels of a row, as [`Hit`] explains them.
+/// First surfaces of [`LANES`] neighbouring pixels of a row, with the fields of [`Hit`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HitGroup {
-    /// Distances in lengths of the rays.
+    /// Distances in multiples of the ray length.
     pub t: Lanes,
-    /// Light in each colour.
+    /// Light in each colour channel.
     pub light: [Lanes; 3],
     /// Reflectances in the near infrared.
     pub infrared: Lanes,
-    /// Cosines between normals and the ways back.
+    /// Cosines between the normals and the rays back.
     pub facing: Lanes,
-    /// The people.
+    /// Indices of the people.
     pub person: [Option<u16>; LANES],
 }
 
 impl HitGroup {
-    /// Rays that meet nothing.
+    /// Rays that hit nothing.
     pub const NOTHING: Self = Self {
         t: [f64::INFINITY; LANES],
         light: [[0.0; LANES]; 3],
@@ -62,7 +62,7 @@ impl HitGroup {
 }
 
 impl HitImage {
-    /// Creates an image in which no ray meets anything.
+    /// Creates an image in which no ray hits anything.
     pub fn nothing(width: usize, height: usize) -> Self {
         let groups = vec![HitGroup::NOTHING; width.div_ceil(LANES) * height];
         Self { width, height, groups }
@@ -112,7 +112,7 @@ impl HitImage {
         Some(group.at(lane))
     }
 
-    /// Creates an image from the surface of each column and row.
+    /// Creates an image from a function of column and row.
     #[cfg(test)]
     pub fn from_fn(width: usize, height: usize, hit: impl Fn(usize, usize) -> Hit) -> Self {
         let mut image = Self::nothing(width, height);

@@ -1,13 +1,14 @@
-//! Values of neighbouring pixels side by side, so that one instruction works on several of them.
+//! Values of neighbouring pixels, stored together so that one instruction processes several of
+//! them.
 //!
 //! Loops over lanes have one body without branches, which the compiler turns into vector
-//! instructions of the processor at hand. Each lane does the same operations in the same order
-//! as the code for one ray does, without fused or reordered arithmetic, and therefore has the
-//! same bits on every processor.
+//! instructions of the target processor. Each lane performs the same operations in the same order
+//! as the code for one ray, without fused or reordered arithmetic, and therefore has the same bits
+//! on every processor.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-/// Pixels side by side: two vectors of AVX-512, four of AVX2.
+/// Number of pixels that are processed together: two vectors of AVX-512, four of AVX2.
 pub const LANES: usize = 16;
 
 /// A number for each lane.
@@ -25,7 +26,7 @@ pub struct Vectors {
 }
 
 impl Vectors {
-    /// Vectors of length zero.
+    /// Vectors that are zero.
     pub const ZERO: Self = Self { x: [0.0; LANES], y: [0.0; LANES], z: [0.0; LANES] };
 
     /// Returns the vector of one lane.
@@ -41,7 +42,7 @@ impl Vectors {
     }
 }
 
-/// Writes the points `t` lengths of the rays away from an eye.
+/// Writes the points at `t` ray lengths from an eye.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 pub fn points(eye: &Point3<f64>, rays: &Vectors, t: &Lanes, to: &mut Vectors) {
     for lane in 0..LANES {
@@ -52,7 +53,7 @@ pub fn points(eye: &Point3<f64>, rays: &Vectors, t: &Lanes, to: &mut Vectors) {
 }
 
 /// Returns the product of a matrix and a vector, in the order of operations of `nalgebra`, whose
-/// loops over rows and columns the compiler does not see through.
+/// loops over rows and columns the compiler does not optimise.
 #[inline(always)]
 pub fn product(matrix: &Matrix3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
     let m = matrix;
@@ -74,7 +75,7 @@ pub fn transposed_product(matrix: &Matrix3<f64>, v: &Vector3<f64>) -> Vector3<f6
     )
 }
 
-/// Returns the scalar product of two vectors; see [`product`].
+/// Returns the dot product of two vectors; see [`product`].
 #[inline(always)]
 pub fn dot(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
     a.x * b.x + a.y * b.y + a.z * b.z

@@ -9,33 +9,34 @@ use tagalong_core::{LaserScan, settings};
 use crate::random::normal_at;
 use crate::world::{self, Object, World};
 
-/// So many rays must meet an object that counts as seen.
+/// Minimum number of rays that must hit an object for it to count as seen.
 const LEAST_RAYS: usize = 2;
 
 settings! {
-    /// A laser scanner on the robot, above the point between its wheels. It looks
-    /// whenever the camera does.
+    /// A laser scanner on the robot, above the point between its wheels. It measures at the times
+    /// of the camera.
     pub struct LaserSettings {
-        /// Rays in a scan.
+        /// Number of rays per scan.
         #[schemars(range(min = 2, max = 4096))]
         pub rays: usize = 360,
-        /// Around the direction ahead, degrees; 360 is all around.
+        /// Field of view around the forward direction, degrees; 360 is a full turn.
         #[schemars(range(min = 10.0, max = 360.0))]
         pub field_of_view_deg: f64 = 360.0,
         /// Height above the floor, m.
         #[schemars(range(min = 0.02, max = 2.0))]
         pub height_m: f64 = 0.2,
-        /// Nearest range that is measured, m.
+        /// Minimum range that is measured, m.
         #[schemars(range(min = 0.0))]
         pub min_range_m: f64 = 0.12,
-        /// Farthest range that is measured, m.
+        /// Maximum range that is measured, m.
         #[schemars(range(max = 100.0))]
         pub max_range_m: f64 = 8.0,
         /// Standard deviation of a range, m.
         #[schemars(range(min = 0.0, max = 1.0))]
         pub sigma_m: f64 = 0.01,
-        /// Standard deviation that grows with the range, m per m, beside `sigma_m`: cheap scanners
-        /// find the range by the angle of a spot, and have 0.005, which is 2 cm at 4 m.
+        /// Standard deviation that grows with the range, m per m, in addition to `sigma_m`: cheap
+        /// scanners determine the range from the angle of a spot, and have 0.005, which is 2 cm at
+        /// 4 m.
         #[schemars(range(min = 0.0, max = 0.2))]
         pub sigma_per_m: f64 = 0.0,
     }
@@ -48,27 +49,27 @@ impl LaserSettings {
         [(grows, "laser.max_range_m must be above laser.min_range_m")]
     }
 
-    /// Direction of the first ray, robot frame, to the left positive, rad.
+    /// Returns the direction of the first ray in the robot frame, rad, positive to the left.
     pub fn first_rad(&self) -> f64 {
         -0.5 * self.field_of_view_deg.to_radians()
     }
 
-    /// From one ray to the next, rad.
+    /// Returns the angle from one ray to the next, rad.
     pub fn step_rad(&self) -> f64 {
         let whole = self.field_of_view_deg >= 360.0;
         let gaps = if whole { self.rays } else { self.rays - 1 };
         self.field_of_view_deg.to_radians().min(TAU) / gaps as f64
     }
 
-    /// Directions of the rays, robot frame, to the left positive, rad.
+    /// Yields the directions of the rays in the robot frame, rad, positive to the left.
     pub fn directions(&self) -> impl Iterator<Item = f64> + use<> {
         let first = self.first_rad();
         let step = self.step_rad();
         (0..self.rays).map(move |ray| first + ray as f64 * step)
     }
 
-    /// Measures the ranges of the rays, m; infinite where nothing is near enough, NaN where an
-    /// object is too near. The noise depends on the seed.
+    /// Measures the ranges of the rays, m; infinite if nothing is within range, NaN if an object is
+    /// too near. The noise depends on the seed.
     pub(crate) fn measure(
         &self,
         world: &World,
@@ -94,7 +95,7 @@ impl LaserSettings {
         ranges
     }
 
-    /// Returns the standard deviation of a range, m; beyond the farthest one it stays the same.
+    /// Returns the standard deviation of a range, m; it is constant beyond the maximum range.
     fn sigma_at(&self, metres: f64) -> f64 {
         if self.sigma_per_m == 0.0 {
             return self.sigma_m;
@@ -103,8 +104,8 @@ impl LaserSettings {
         (self.sigma_m * self.sigma_m + growing_m * growing_m).sqrt()
     }
 
-    /// Returns true if two rays or more meet an object within the range, with none of the others
-    /// before it.
+    /// Returns true if at least two rays hit an object within the range, with none of the other
+    /// objects in front of it.
     pub(crate) fn reaches(
         &self,
         own: &Object,
@@ -122,7 +123,7 @@ impl LaserSettings {
         meets.take(LEAST_RAYS).count() == LEAST_RAYS
     }
 
-    /// Returns the scan that some ranges stand for; the scanner sits above the robot's origin.
+    /// Returns the scan with these ranges; the scanner is above the robot's origin.
     pub fn scan(&self, ranges: &[f32]) -> LaserScan {
         let mount = Isometry3::translation(0.0, 0.0, self.height_m);
         let limits_m = [self.min_range_m, self.max_range_m];

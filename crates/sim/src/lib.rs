@@ -1,14 +1,13 @@
-//! Simulated worlds: rooms with people in them, seen by the sensors of a moving robot, and the
-//! truth about all of it.
+//! Simulated worlds: rooms with people, seen by the sensors of a moving robot, with ground truth.
 //!
-//! Real logs with exact truth are rare. A simulated one replaces them only if it is hard in the
-//! ways in which real ones are: people have the sizes, the gait and the habits of people, furniture
-//! has the silhouettes of people, depth has steps, holes and shadows, odometry drifts, and the
-//! camera is not quite where the log says that it is.
+//! Real logs with exact truth are rare. A simulated log can replace them only if it is difficult in
+//! the same ways: people have realistic sizes, gaits and habits, furniture has the silhouettes of
+//! people, depth has steps, holes and shadows, odometry drifts, and the camera is not exactly where
+//! the log says.
 //!
-//! A [`Scene`] is read from TOML; a [`Simulation`] hands out [`Event`]s in the order in which a
-//! robot would have recorded them. The caller may steer the robot between two events: images are
-//! drawn from where it really is. The same scene gives the same events on any number of threads.
+//! A [`Scene`] is read from TOML; a [`Simulation`] returns [`Event`]s in the order in which a robot
+//! would have recorded them. The caller may steer the robot between two events: images are rendered
+//! from the robot's true pose. The same scene gives the same events with any number of threads.
 //!
 //! ```
 //! use tagalong_sim::{Event, Scene, Simulation};
@@ -22,8 +21,8 @@
 //! ```
 //!
 //! One file describes any number of scenes: its table `[vary]` lists the settings that differ from
-//! seed to seed, a [`Variant`] picks one, and a [`Split`] keeps seeds, people and rooms for
-//! training, validation and test apart.
+//! seed to seed, a [`Variant`] selects one, and a [`Split`] separates the seeds, people and rooms
+//! for training, validation and test.
 //!
 //! ```
 //! use tagalong_sim::{Scene, Split, Variant};
@@ -36,8 +35,8 @@
 //!
 //! World coordinates have X along the room, Y across it and Z up, in metres.
 
-// Lanes are walked by index, because each step reads and writes several arrays at the same lane;
-// iterators zipped over all of them would hide the arithmetic.
+// Loops over lanes use an index, because each step reads and writes several arrays at the same
+// lane; iterators zipped over all of them would hide the arithmetic.
 #![allow(clippy::needless_range_loop)]
 
 mod approach;

@@ -11,33 +11,33 @@ use crate::random::normal_at;
 use crate::world::World;
 
 settings! {
-    /// A 3-D lidar on the robot, above the point between its wheels, level. It looks whenever the
-    /// camera does.
+    /// A level 3-D lidar on the robot, above the point between its wheels. It measures at the times
+    /// of the camera.
     pub struct LidarSettings {
-        /// Order of the beams.
+        /// Pattern of the beams.
         pub pattern: BeamPattern = BeamPattern::Rings,
-        /// Beams in a cloud.
+        /// Number of beams per cloud.
         #[schemars(range(max = 200_000))]
         pub beams: usize = 14_400,
-        /// Rings of a spinning lidar.
+        /// Number of rings of a spinning lidar.
         #[schemars(range(min = 1, max = 128))]
         pub rings: usize = 16,
-        /// Around the direction ahead, degrees; 360 is all around.
+        /// Field of view around the forward direction, degrees; 360 is a full turn.
         #[schemars(range(min = 10.0, max = 360.0))]
         pub field_of_view_deg: f64 = 360.0,
-        /// Lowest beams above the horizon, degrees ...
+        /// Elevation of the lowest beams, degrees ...
         #[schemars(range(min = -90.0))]
         pub lowest_deg: f64 = -15.0,
-        /// ... and the highest ones, degrees.
+        /// ... and of the highest ones, degrees.
         #[schemars(range(max = 90.0))]
         pub highest_deg: f64 = 15.0,
         /// Height above the floor, m.
         #[schemars(range(min = 0.02, max = 3.0))]
         pub height_m: f64 = 0.8,
-        /// Nearest range that is measured, m.
+        /// Minimum range that is measured, m.
         #[schemars(range(min = 0.0))]
         pub min_range_m: f64 = 0.3,
-        /// Farthest range that is measured, m.
+        /// Maximum range that is measured, m.
         #[schemars(range(max = 200.0))]
         pub max_range_m: f64 = 30.0,
         /// Standard deviation of a range, m.
@@ -46,18 +46,18 @@ settings! {
     }
 }
 
-/// Order of the beams of a lidar.
+/// Pattern of the beams of a lidar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum BeamPattern {
     /// A spinning lidar: rings at equal angles above each other.
     Rings,
-    /// Two turning prisms, as in solid-state lidars: a rosette whose petals are elsewhere in each
-    /// cloud.
+    /// Two rotating prisms, as in solid-state lidars: a rosette whose petals are at other positions
+    /// in each cloud.
     Rosette,
 }
 
-/// Turns of the two prisms in a cloud. They have no small common multiple with each other, or the
+/// Number of turns of the two prisms per cloud. They have no small common multiple, otherwise the
 /// rosette would close.
 const PRISM_TURNS: [f64; 2] = [121.377, -78.521];
 
@@ -77,7 +77,7 @@ impl LidarSettings {
         ]
     }
 
-    /// Returns azimuth, to the left positive, and elevation of a beam of the cloud with this number,
+    /// Returns azimuth, positive to the left, and elevation of a beam in the cloud with this index,
     /// rad.
     fn angles(&self, cloud: u64, beam: usize) -> [f64; 2] {
         let width = self.field_of_view_deg.to_radians();
@@ -89,7 +89,7 @@ impl LidarSettings {
                 let column = beam / self.rings;
                 let ring = beam % self.rings;
                 let gaps = (self.rings - 1).max(1) as f64;
-                // Each column has its own direction, also where the view is a whole turn.
+                // Each column has its own direction, even if the field of view is a full turn.
                 let along = (column as f64 + 0.5) / columns as f64 - 0.5;
                 [along * width, lowest + height * ring as f64 / gaps]
             }
@@ -103,8 +103,8 @@ impl LidarSettings {
         }
     }
 
-    /// Measures the points of the cloud with this number, in the frame of the lidar, m; beams that
-    /// meet nothing in range have none. The noise depends on the seed.
+    /// Measures the points of the cloud with this index, in the frame of the lidar, m; beams
+    /// without a hit in range give none. The noise depends on the seed.
     pub(crate) fn measure(
         &self,
         world: &World,
@@ -135,7 +135,7 @@ impl LidarSettings {
         points
     }
 
-    /// Returns the cloud that some points in the frame of the lidar stand for.
+    /// Returns the cloud with these points in the frame of the lidar.
     pub fn cloud(&self, points: &[[f32; 3]]) -> PointCloud {
         let scanner = Point3::new(0.0, 0.0, self.height_m);
         let points = points.iter().map(|point| scanner + Vector3::from(point.map(f64::from)));

@@ -1,5 +1,5 @@
-//! Appearance of surfaces: colours and procedural patterns. Patterns lie in the axes of the solid
-//! that they are on, so that a stripe moves with its shirt.
+//! Appearance of surfaces: colours and procedural patterns. Patterns are in the axes of their
+//! solid, so that a stripe moves with its shirt.
 
 use nalgebra::Vector3;
 
@@ -12,20 +12,20 @@ pub type Colour = [f64; 3];
 /// A surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
-    /// The colour that most of it has.
+    /// Main colour.
     pub colour: Colour,
-    /// The other colour of the pattern; hair on heads.
+    /// Second colour of the pattern; the hair of heads.
     pub second: Colour,
     /// Layout of the two colours.
     pub pattern: Pattern,
-    /// Reflectance in the near infrared of a structured-light camera. Cloth that
-    /// is black to the eye often is not black there.
+    /// Reflectance in the near infrared of a structured-light camera. Cloth that looks black to the
+    /// eye is often not black there.
     pub infrared: f64,
-    /// Share of the light that is mirrored.
+    /// Fraction of the light that is mirrored.
     pub reflects: f64,
-    /// Share of the light that comes through from behind; the rest is the surface's own.
+    /// Fraction of the light that passes through from behind; the rest is the surface's own.
     pub passes: f64,
-    /// Light of its own: it is as bright as if this much more light fell on it, lx.
+    /// Light that it emits: it is as bright as if this much more light fell on it, lx.
     pub glow_lux: f64,
 }
 
@@ -42,22 +42,22 @@ pub enum Pattern {
     Mottled(f64),
     /// Floor boards of this width along X.
     Planks(f64),
-    /// A head with these half axes: face, hair and the hairline's height at the
-    /// forehead as a fraction of the half height.
+    /// A head with these half axes: face, hair, and the height of the hairline at the forehead as a
+    /// fraction of the half height.
     Head {
         /// Half axes: forward, left, up, m.
         half: Vector3<f64>,
         /// Height of the hairline, 1 is the top of the head.
         hairline: f64,
     },
-    /// A printed person on a sheet that spans Y and Z, half sides given.
+    /// A printed person on a sheet that spans Y and Z, with these half sides.
     Print(f64, f64),
 }
 
 impl Material {
-    /// One colour.
+    /// Creates a material with one colour.
     pub fn plain(colour: Colour) -> Self {
-        // Bright cloth usually reflects more infrared, too.
+        // Bright cloth usually also reflects more infrared.
         Self {
             colour,
             second: colour,
@@ -69,28 +69,28 @@ impl Material {
         }
     }
 
-    /// A silvered mirror, a little dusty.
+    /// Creates a silvered mirror, slightly dusty.
     pub fn mirror() -> Self {
         Self { reflects: 0.9, infrared: 0.0, ..Self::plain([0.5; 3]) }
     }
 
-    /// Clear glass: both of its faces together mirror some 8 % of the light that falls straight on
-    /// them (Fresnel, index 1.5).
+    /// Creates clear glass: its two faces together reflect some 8 % of the light at normal
+    /// incidence (Fresnel, index 1.5).
     pub fn glass() -> Self {
         Self { reflects: 0.08, passes: 0.88, infrared: 0.0, ..Self::plain([0.4, 0.5, 0.45]) }
     }
 
-    /// The same with light of its own.
+    /// Returns the material with emitted light.
     pub fn glowing(self, glow_lux: f64) -> Self {
         Self { glow_lux, ..self }
     }
 
-    /// Two colours in a pattern.
+    /// Creates a material with two colours in a pattern.
     pub fn patterned(colour: Colour, second: Colour, pattern: Pattern) -> Self {
         Self { second, pattern, ..Self::plain(colour) }
     }
 
-    /// The same with another reflectance in the near infrared.
+    /// Returns the material with another reflectance in the near infrared.
     pub fn with_infrared(self, infrared: f64) -> Self {
         Self { infrared, ..self }
     }
@@ -100,7 +100,7 @@ impl Material {
         self.reflects == 0.0 && self.passes == 0.0
     }
 
-    /// The colour at a point in the solid's own axes.
+    /// Returns the colour at a point in the solid's own axes.
     pub fn at(&self, own: &Vector3<f64>) -> Colour {
         match self.pattern {
             Pattern::Plain => self.colour,
@@ -115,12 +115,11 @@ impl Material {
         }
     }
 
-    /// Returns red, green and blue at points in the solid's own axes, of which only the `wanted`
-    /// ones count.
+    /// Returns red, green and blue at points in the solid's own axes; only the `wanted` ones count.
     pub fn colours(&self, own: &Vectors, wanted: &[bool; LANES]) -> [Lanes; 3] {
         let tones = match self.pattern {
             Pattern::Plain => return self.colour.map(|c| [c; LANES]),
-            // A tone of one would not be the second colour to the last bit.
+            // Mixing with a tone of one would not give exactly the second colour.
             Pattern::Checks(side) => return self.chequered(own, side),
             Pattern::Mottled(size) => mottles(own, size),
             Pattern::Planks(width) => planks(own, width),
@@ -138,7 +137,8 @@ impl Material {
         [tint(0), tint(1), tint(2)]
     }
 
-    /// Small things have so few pixels that vectors would not gain anything.
+    /// Computes the colours one by one. Small objects have so few pixels that vector instructions
+    /// would not gain anything.
     fn colours_one_by_one(&self, own: &Vectors, wanted: &[bool; LANES]) -> [Lanes; 3] {
         let mut colours = [[0.0; LANES]; 3];
         for lane in (0..LANES).filter(|lane| wanted[*lane]) {
@@ -153,7 +153,7 @@ impl Material {
         if second { self.second } else { self.colour }
     }
 
-    /// `n` is the point on the unit ball: x forward, y left, z up.
+    /// Returns the colour of a head; `n` is the point on the unit ball: x forward, y left, z up.
     fn head(&self, n: &Vector3<f64>, hairline: f64) -> Colour {
         // The hairline is high at the forehead and low at the neck.
         let line = hairline - (1.4 * (0.55 - n.x)).clamp(0.0, 1.2);
@@ -186,7 +186,8 @@ impl Material {
         self.colour
     }
 
-    /// A head and shoulders in the second colour's clothes; -1 to 1 both ways.
+    /// Returns the colour of a printed head and shoulders in clothes of the second colour; -1 to 1
+    /// in both directions.
     fn print(&self, y: f64, z: f64) -> Colour {
         const SKIN: Colour = [0.55, 0.36, 0.27];
         let ellipse = |cz: f64, ry: f64, rz: f64| (y / ry).powi(2) + ((z - cz) / rz).powi(2) < 1.0;
@@ -202,12 +203,12 @@ impl Material {
     }
 }
 
-/// Brightness of a colour, 0 to 1 (weights of ITU-R BT.709).
+/// Returns the brightness of a colour, 0 to 1 (weights of ITU-R BT.709).
 pub fn luma(colour: Colour) -> f64 {
     0.2126 * colour[0] + 0.7152 * colour[1] + 0.0722 * colour[2]
 }
 
-/// A colour made brighter or darker.
+/// Returns a colour made brighter or darker.
 pub fn scaled(colour: Colour, by: f64) -> Colour {
     colour.map(|c| (c * by).min(1.0))
 }
@@ -243,22 +244,23 @@ fn planks(own: &Vectors, width: f64) -> Lanes {
     tones
 }
 
-// Without branches, so that loops over lanes become vector instructions. Whole numbers wrap
-// instead of being checked for an overflow, which would be a branch.
+// Without branches, so that loops over lanes become vector instructions. Integers wrap, because a
+// check for overflow would be a branch.
 
-/// One where the squares along all axes add up to an odd number, zero elsewhere.
+/// Returns one where the indices of the squares along all axes add up to an odd number, zero
+/// elsewhere.
 #[inline(always)]
 fn odd(own: &Vector3<f64>, side: f64) -> i64 {
     (floor(own.x / side) ^ floor(own.y / side) ^ floor(own.z / side)) & 1
 }
 
-/// Tone of a floor board, 0 to 1.
+/// Returns the tone of a floor board, 0 to 1.
 #[inline(always)]
 fn plank(own: &Vector3<f64>, width: f64) -> f64 {
     let row = floor(own.y / width) as u64;
     let board = floor(own.x / (8.0 * width) + uniform_at(11, row)) as u64;
     let tone = uniform_at(row, board);
-    // Boards lie flat: their grain has no height.
+    // Boards are horizontal, so their grain does not depend on the height.
     let x = own.x * 0.1;
     let y = own.y;
     let size = 0.15 * width;
@@ -267,7 +269,7 @@ fn plank(own: &Vector3<f64>, width: f64) -> f64 {
     0.6 * tone + 0.4 * grain
 }
 
-/// Value noise of two octaves, 0 to 1.
+/// Returns value noise of two octaves, 0 to 1.
 #[inline(always)]
 fn clouds(own: &Vector3<f64>, size: f64) -> f64 {
     let fine = 2.3 / size;
@@ -275,12 +277,12 @@ fn clouds(own: &Vector3<f64>, size: f64) -> f64 {
     0.65 * coarse + 0.35 * value_noise(own.x * fine, own.y * fine, own.z * fine)
 }
 
-/// Adding this number leaves no digits behind the point: half of those of a mantissa are above it.
+/// Adding this number leaves no fractional digits: half of those of a mantissa are above it.
 const WHOLE: f64 = 6_755_399_441_055_744.0;
 
-/// The largest whole number that is not larger, of numbers below 2^51. `f64::floor` calls a
-/// function where the processor need not have an instruction for it, and conversions to 64 bits
-/// are no vector instructions before AVX-512.
+/// Returns the largest integer that is not larger, for numbers below 2^51. `f64::floor` would call
+/// a function if the target processor may lack the instruction, and conversions to 64 bits are not
+/// vector instructions before AVX-512.
 #[inline(always)]
 fn floor(value: f64) -> i64 {
     let shifted = value + WHOLE;
@@ -288,7 +290,7 @@ fn floor(value: f64) -> i64 {
     nearest.wrapping_sub(i64::from(shifted - WHOLE > value))
 }
 
-/// Returns the part of a number above its [`floor`].
+/// Returns the fractional part of a number, above its [`floor`].
 #[inline(always)]
 fn part(value: f64) -> f64 {
     let whole = (value + WHOLE) - WHOLE;
@@ -300,7 +302,7 @@ fn smooth(part: f64) -> f64 {
     part * part * (3.0 - 2.0 * part)
 }
 
-/// Random values at the corners of a grid, smoothly joined.
+/// Returns smoothly interpolated random values at the corners of a grid.
 #[inline(always)]
 fn value_noise(x: f64, y: f64, z: f64) -> f64 {
     let below = floor(z);
@@ -308,13 +310,13 @@ fn value_noise(x: f64, y: f64, z: f64) -> f64 {
     between(layer(x, y, below), layer(x, y, above), smooth(part(z)))
 }
 
-/// As [`value_noise`] in the plane `z = 0`, where the layer above has no weight.
+/// Returns [`value_noise`] in the plane `z = 0`, where the layer above has no weight.
 #[inline(always)]
 fn flat_noise(x: f64, y: f64) -> f64 {
     layer(x, y, 0)
 }
 
-/// Values of one layer of the grid.
+/// Interpolates one layer of the grid.
 #[inline(always)]
 fn layer(x: f64, y: f64, layer: i64) -> f64 {
     let column = floor(x);
@@ -333,7 +335,8 @@ fn between(a: f64, b: f64, part: f64) -> f64 {
     a + (b - a) * part
 }
 
-/// Large primes spread neighbouring cells over the keys (Teschner et al., VMV 2003).
+/// Returns the random value at a corner. Large primes spread neighbouring cells over the keys
+/// (Teschner et al., VMV 2003).
 #[inline(always)]
 fn corner(column: i64, row: i64, layer: i64) -> f64 {
     let key = column.wrapping_mul(73_856_093) ^ row.wrapping_mul(19_349_663);

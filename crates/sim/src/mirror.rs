@@ -1,5 +1,5 @@
-//! Images in a conical mirror: each pixel's ray meets the cone and is reflected there, also where
-//! the mirror hangs a little askew.
+//! Images in a conical mirror: the ray of each pixel hits the cone and is reflected there, even if
+//! the mirror is slightly tilted.
 
 use nalgebra::{Isometry3, Point2, Point3, UnitQuaternion, Vector3};
 use tagalong_core::settings;
@@ -16,33 +16,33 @@ use crate::world::World;
 
 /// Side of a tile, pixels.
 const TILE: usize = LANES;
-/// The mirror fills the image up to this part of half its smaller side.
+/// Fraction of half the smaller image side that the mirror fills.
 const FILLED: f64 = 0.97;
 
 settings! {
     /// The mirror of a panorama camera.
     pub struct MirrorSettings {
-        /// Between the axis and the surface, degrees.
+        /// Angle between the axis and the surface, degrees.
         #[schemars(range(min = 50.0, max = 85.0))]
         pub half_angle_deg: f64 = 67.5,
         /// Height of the apex above the pinhole, m.
         #[schemars(range(min = 0.005, max = 1.0))]
         pub apex_m: f64 = 0.05,
-        /// Smallest and largest angle from the axis that the log calls useful,
-        /// degrees; the rim of the mirror is at the larger one. An angle `phi` looks
-        /// `2 * half_angle_deg - 90 - phi` degrees below the horizon.
+        /// Minimum and maximum useful angle from the axis in the log, degrees; the rim of the
+        /// mirror is at the larger one. An angle `phi` looks `2 * half_angle_deg - 90 - phi`
+        /// degrees below the horizon.
         pub view_deg: [f64; 2] = [2.0, 53.0],
         /// Columns and rows of the unwrapped panorama in which the truth gives regions.
         #[schemars(inner(range(min = 8, max = 4096)))]
         pub panorama: [usize; 2] = [480, 120],
-        /// Where the axis is seen, from the middle of the image, pixels; the log knows it.
+        /// Position of the axis relative to the middle of the image, pixels; known in the log.
         pub centre_px: [f64; 2] = [0.0, 0.0],
-        /// Standard deviation of the log's mistake about that, pixels.
+        /// Standard deviation of the log's error in that position, pixels.
         pub centre_error_px: f64 = 0.3,
-        /// Standard deviation of the log's mistake about `half_angle_deg`, degrees.
+        /// Standard deviation of the log's error in `half_angle_deg`, degrees.
         pub angle_error_deg: f64 = 0.1,
-        /// Standard deviation of the tilt of the mirror against the camera, degrees;
-        /// the log does not know it.
+        /// Standard deviation of the tilt of the mirror relative to the camera, degrees; not known
+        /// in the log.
         pub tilt_error_deg: f64 = 0.2,
     }
 }
@@ -67,18 +67,18 @@ pub struct MirrorCamera {
     /// The mirror and its unwrapped image as the log describes them.
     pub panorama: Panorama,
     size: (usize, usize),
-    /// As it really is.
+    /// The mirror as it really is.
     mirror: ConicalMirror,
     mirror_from_camera: Isometry3<f64>,
     rim_m: f64,
 }
 
 impl MirrorCamera {
-    /// A camera with chance mistakes in its calibration.
+    /// Creates a camera with random errors in its calibration.
     pub fn new(settings: &CameraSettings, random: &mut Random) -> Self {
         let mirror = mirror(settings);
         let of = &settings.mirror;
-        // Beyond two standard deviations a calibration would have been repeated.
+        // A calibration with errors beyond two standard deviations would have been repeated.
         let mut error = |sigma: f64| sigma * random.normal().clamp(-2.0, 2.0);
         let logged = Point2::new(
             mirror.centre_px.x + error(of.centre_error_px),
@@ -102,8 +102,8 @@ impl MirrorCamera {
         }
     }
 
-    /// As an ordinary camera: the lens below the mirror, looking up from the
-    /// middle of the robot.
+    /// Returns it as an ordinary camera: the lens below the mirror, looking up from the middle of
+    /// the robot.
     pub fn camera(&self, height_m: f64) -> Camera {
         let ConicalMirror { focal_px, centre_px, .. } = self.panorama.mirror;
         let lens = Pinhole {
@@ -121,7 +121,7 @@ impl MirrorCamera {
         }
     }
 
-    /// Where a pixel's ray leaves the mirror, and its unit direction, in the
+    /// Returns the point at which a pixel's ray leaves the mirror, and its unit direction, in the
     /// camera frame; `None` beside the mirror, where the housing is black.
     pub fn ray(&self, column: f64, row: f64) -> Option<(Point3<f64>, Vector3<f64>)> {
         let x = column - self.mirror.centre_px.x;
@@ -138,9 +138,9 @@ impl MirrorCamera {
         Some((back * at, back.rotation * leaves))
     }
 
-    /// The way to the cone `x² + y² = (z tan)²` with its apex at the origin. It
-    /// opens upwards; below the apex the equation has another cone, through
-    /// which the ray passes first.
+    /// Returns the distance along a ray to the cone `x² + y² = (z tan)²` with its apex at the
+    /// origin. The cone opens upwards; below the apex the equation has another cone, through which
+    /// the ray passes first.
     fn meet(&self, from: &Point3<f64>, along: &Vector3<f64>) -> Option<f64> {
         let square = self.mirror.half_angle_rad.tan().powi(2);
         let form = |a: &Vector3<f64>, b: &Vector3<f64>| a.x * b.x + a.y * b.y - square * a.z * b.z;
@@ -156,8 +156,8 @@ impl MirrorCamera {
         (at.z > 0.0 && at.xy().coords.norm() < self.rim_m).then_some(t)
     }
 
-    /// Renders the view in the mirror without any noise; `t` is the distance from the mirror in
-    /// metres. The image is the same for any number of threads.
+    /// Renders the view in the mirror without noise; `t` is the distance from the mirror in metres.
+    /// The image is the same for any number of threads.
     pub fn draw(
         &self,
         world: &World,
@@ -195,9 +195,9 @@ impl MirrorCamera {
         }
     }
 
-    /// Returns how the upper body of a person appears, in pixels of the unwrapped panorama. The
-    /// first region is where it must be by the position of the head; the others are those that the
-    /// raw image shows, unwrapped by the calibration in the log.
+    /// Returns the appearance of a person's upper body, in pixels of the unwrapped panorama. The
+    /// first region follows from the position of the head; the others are those that the raw image
+    /// shows, unwrapped with the calibration in the log.
     pub fn sight(
         &self,
         raw: &HitImage,
@@ -217,7 +217,8 @@ impl MirrorCamera {
         (Some(region), seen)
     }
 
-    /// At most some 40 x 40 rays are cast.
+    /// Compares the visible part of a person with the view without other objects; casts at most
+    /// some 40 x 40 rays.
     fn visibility(
         &self,
         raw: &HitImage,
@@ -232,7 +233,7 @@ impl MirrorCamera {
             for column in 0..(region.width / step) as usize {
                 let x = region.x + step * column as f64;
                 let y = region.y + step * row as f64;
-                // Truth is that of the raw image, where the pixels were measured.
+                // The truth comes from the raw image, where the pixels were measured.
                 let pixel = self.panorama.raw_pixel(x, y).map(f64::round);
                 let there = raw.get(pixel.x as i64, pixel.y as i64);
                 let (Some(there), Some((from, along))) = (there, self.ray(pixel.x, pixel.y)) else {
@@ -249,7 +250,7 @@ impl MirrorCamera {
     }
 }
 
-/// Visible pixels of a person, and of others in front.
+/// Numbers of visible pixels of a person, and of others in front.
 #[derive(Default)]
 struct Count {
     whole: u32,
@@ -278,8 +279,8 @@ impl Count {
     }
 }
 
-/// The solids that any of some rays may meet: those whose surrounding ball
-/// reaches into a cone about all of them.
+/// Returns the solids that any of these rays may hit: those whose bounding ball intersects a cone
+/// around all rays.
 fn within_reach<'a>(world: &'a World, rays: &[MirrorRay]) -> Vec<(Option<u16>, &'a Shape)> {
     let Some((_, eye, _)) = rays.get(rays.len() / 2) else { return Vec::new() };
     let axis = rays.iter().map(|ray| ray.2).sum::<Vector3<f64>>();
@@ -316,7 +317,7 @@ fn mirror(settings: &CameraSettings) -> ConicalMirror {
     }
 }
 
-/// Radius of the mirror: a little more than is of use.
+/// Returns the radius of the mirror, which is slightly larger than the useful part.
 fn rim_m(mirror: &ConicalMirror) -> f64 {
     let slope = mirror.outer_px / mirror.focal_px;
     let surface = mirror.half_angle_rad.tan();

@@ -1,18 +1,18 @@
 use nalgebra::{Point2, Vector2};
 
-/// A round thing that people walk around.
+/// A round object that people walk around.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Obstacle {
-    /// Where it stands, m.
+    /// Position, m.
     pub at: Point2<f64>,
-    /// Its radius, m.
+    /// Radius, m.
     pub radius_m: f64,
-    /// Velocity with which it moves, if it moves, m: a blocked walker goes round behind it.
+    /// Velocity if it moves, m/s: a blocked walker passes behind it.
     pub ahead: Vector2<f64>,
 }
 
 impl Obstacle {
-    /// A thing that stays where it is.
+    /// Creates an object that does not move.
     pub fn standing(at: Point2<f64>, radius_m: f64) -> Self {
         Self { at, radius_m, ahead: Vector2::zeros() }
     }

@@ -1,4 +1,4 @@
-//! Further sensors of obstacles on the robot: laser scanners, sonars, infrared sensors, bumpers.
+//! Further obstacle sensors on the robot: laser scanners, sonars, infrared sensors, bumpers.
 
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
@@ -15,8 +15,8 @@ use crate::random::normal_at;
 use crate::scene::Scene;
 use crate::world::World;
 
-/// Rings of rays around the axis of a cone, and the rays of the first ring; each next one has so
-/// many more.
+/// Number of rings of rays around the axis of a cone, and of rays in the first ring; each further
+/// ring has that many more.
 const RINGS: u32 = 3;
 const RAYS_OF_RING: u32 = 6;
 
@@ -24,29 +24,28 @@ const RAYS_OF_RING: u32 = 6;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RangeKind {
-    /// Ultrasound: glass and mirrors are surfaces like others; large smooth ones that it meets
-    /// obliquely send the sound away.
+    /// Ultrasound: glass and mirrors are ordinary surfaces; large smooth surfaces at an oblique
+    /// angle reflect the sound away.
     #[default]
     Sonar,
-    /// Light: it goes through glass, and mirrors send it on.
+    /// Light: it passes through glass, and mirrors reflect it.
     Infrared,
 }
 
 settings! {
     /// A range sensor on the robot: the distance to the nearest surface within a cone.
     pub struct RangeSettings {
-        /// Name, as that of its source in `[[collision_monitor.sources]]`.
+        /// Name of its source in `[[collision_monitor.sources]]`.
         pub name: String,
         /// Kind of the sensor.
         pub kind: RangeKind = RangeKind::Sonar,
-        /// Place on the robot: forward, to the left and up, m, and the direction, degrees to the
-        /// left.
+        /// Position on the robot: forward, left and up, m, and the direction, degrees to the left.
         pub mount: [f64; 4] = [0.2, 0.0, 0.25, 0.0],
         /// Angle of the cone, degrees.
         pub field_of_view_deg: f64 = 30.0,
-        /// Nearest distance that is measured, m.
+        /// Minimum distance that is measured, m.
         pub min_range_m: f64 = 0.05,
-        /// Farthest distance that is measured, m.
+        /// Maximum distance that is measured, m.
         pub max_range_m: f64 = 4.0,
         /// Standard deviation of a distance, m.
         pub sigma_m: f64 = 0.01,
@@ -56,32 +55,32 @@ settings! {
 }
 
 settings! {
-    /// A bumper on the robot: pressed while the robot touches something within an arc.
+    /// A bumper on the robot: pressed while the robot touches an object within an arc.
     pub struct BumperSettings {
-        /// Name, as that of its source in `[[collision_monitor.sources]]`.
+        /// Name of its source in `[[collision_monitor.sources]]`.
         pub name: String,
-        /// Directions that it covers, degrees to the left, from the right end to the left one.
+        /// Directions that it covers, degrees to the left, from its right end to its left end.
         pub arc_deg: [f64; 2] = [-90.0, 90.0],
         /// Readings per second.
         pub rate_hz: f64 = 50.0,
     }
 }
 
-/// A laser scanner on the robot besides `laser`.
+/// A laser scanner on the robot in addition to `laser`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ScannerSettings {
-    /// Name, as that of its source in `[[collision_monitor.sources]]`.
+    /// Name of its source in `[[collision_monitor.sources]]`.
     pub name: String,
-    /// Place on the robot: forward, to the left and up, m, and the direction, degrees to the left.
+    /// Position on the robot: forward, left and up, m, and the direction, degrees to the left.
     pub mount: [f64; 4],
-    /// Rays in a scan.
+    /// Number of rays per scan.
     pub rays: usize,
-    /// Around its direction, degrees; 360 is all around.
+    /// Field of view around its direction, degrees; 360 is a full turn.
     pub field_of_view_deg: f64,
-    /// Nearest range that is measured, m.
+    /// Minimum range that is measured, m.
     pub min_range_m: f64,
-    /// Farthest range that is measured, m.
+    /// Maximum range that is measured, m.
     pub max_range_m: f64,
     /// Standard deviation of a range, m.
     pub sigma_m: f64,
@@ -105,20 +104,20 @@ impl Default for ScannerSettings {
     }
 }
 
-/// Newest reading of a further sensor of obstacles.
+/// Newest reading of a further obstacle sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SensorReading {
     /// Name of the sensor.
     pub name: Arc<str>,
-    /// Since the start, ns.
+    /// Time since the start, ns.
     pub at_ns: u64,
-    /// The same by the stamp of the message, ns.
+    /// The same time in the stamp of the message, ns.
     pub stamp_ns: u64,
     /// The reading.
     pub data: SensorData,
 }
 
-/// Data of a further sensor of obstacles.
+/// Data of a further obstacle sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SensorData {
     /// Ranges of a scanner.
@@ -180,7 +179,7 @@ impl RangeSettings {
             nearest_m = nearest_m.min(met_m);
         }
         let measured_m = nearest_m + self.sigma_m * normal_at(seed, fingerprint(self.name.bytes()));
-        // REP 117: infinite where there is nothing, negative infinite where it is too near.
+        // REP 117: infinity if there is nothing, minus infinity if it is too near.
         let range_m = match measured_m {
             metres if metres > self.max_range_m => f64::INFINITY,
             metres if metres < self.min_range_m => f64::NEG_INFINITY,
@@ -210,7 +209,7 @@ impl ScannerSettings {
         pose(self.mount)
     }
 
-    /// Returns the scanner at the height of its mount, as one above the middle of the robot.
+    /// Returns the scanner at the height of its mount, as a scanner above the middle of the robot.
     pub fn laser(&self) -> LaserSettings {
         LaserSettings {
             rays: self.rays,
@@ -223,7 +222,7 @@ impl ScannerSettings {
         }
     }
 
-    /// Returns the scan that some ranges stand for, with the scanner at a pose in the robot frame.
+    /// Returns the scan with these ranges, with the scanner at a pose in the robot frame.
     pub fn scan(&self, robot_from_scanner: Isometry3<f64>, ranges: &[f32]) -> LaserScan {
         let laser = self.laser();
         let limits_m = [self.min_range_m, self.max_range_m];
@@ -250,7 +249,7 @@ impl ScannerSettings {
     }
 }
 
-/// Returns why the further sensors of a scene cannot work, if they cannot.
+/// Returns the reason why the further sensors of a scene cannot work, if there is one.
 pub(crate) fn problem(scene: &Scene) -> Option<String> {
     let of_ranges = scene.ranges.iter().flat_map(RangeSettings::rules);
     let of_bumpers = scene.bumpers.iter().flat_map(BumperSettings::rules);

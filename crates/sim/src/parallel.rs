@@ -1,11 +1,10 @@
-//! Work on parts of an image that do not depend on each other, so that any
-//! number of threads does the same.
+//! Work on independent parts of an image, with the same result for any number of threads.
 
 use std::sync::{Mutex, PoisonError};
 use std::thread;
 
-/// Works on pieces of `length` values each, the last one perhaps shorter. The
-/// work is told the number of its piece.
+/// Processes pieces of `length` values each; the last one may be shorter. `work` gets the index of
+/// its piece.
 pub fn in_pieces<T: Send>(
     values: &mut [T],
     length: usize,
@@ -15,14 +14,14 @@ pub fn in_pieces<T: Send>(
     let pieces = Mutex::new(values.chunks_mut(length.max(1)).enumerate());
     thread::scope(|scope| {
         for _ in 1..threads {
-            // Without another thread, those that run do its work.
+            // If a thread cannot be started, the running ones do its work.
             let _ = thread::Builder::new().spawn_scoped(scope, || do_pieces(&pieces, &work));
         }
         do_pieces(&pieces, &work);
     });
 }
 
-/// Works on pieces until none is left.
+/// Processes pieces until none is left.
 fn do_pieces<'a, T: 'a>(
     pieces: &Mutex<impl Iterator<Item = (usize, &'a mut [T])>>,
     work: &impl Fn(usize, &mut [T]),
@@ -32,7 +31,7 @@ fn do_pieces<'a, T: 'a>(
     }
 }
 
-/// The next piece; the lock is held no longer than that.
+/// Returns the next piece; the lock is held no longer than that.
 fn next<T>(work: &Mutex<impl Iterator<Item = T>>) -> Option<T> {
     work.lock().unwrap_or_else(PoisonError::into_inner).next()
 }

@@ -3,15 +3,15 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Variation of the paths of a scene by its seed. Splits share no path.
+/// Variation of the paths of a scene with its seed. No path is shared between splits.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PathVariation {
-    /// The way-points of the first person are moved by up to this in X and in Y, m, except those
-    /// within 1 m of furniture.
+    /// Maximum shift of the way-points of the first person in X and in Y, m; those within 1 m of
+    /// furniture are not moved.
     #[schemars(range(min = 0.0, max = 2.0))]
     pub path_jitter_m: f64,
-    /// Every other seed or so mirrors the scene from left to right.
+    /// If true, about every second seed mirrors the scene from left to right.
     pub mirror: bool,
 }
 
@@ -21,8 +21,8 @@ impl PathVariation {
         *self == Self::default()
     }
 
-    /// Returns the conditions on the settings, each with the message for a violation; a scene has
-    /// sides if windows or cameras hang on one of its walls.
+    /// Returns the conditions on the settings, each with the message for a violation. A scene has
+    /// sides if windows or cameras are on one of its walls.
     pub(crate) fn rules(&self, has_sides: bool) -> [(bool, &'static str); 1] {
         [(
             !(self.mirror && has_sides),

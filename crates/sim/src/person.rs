@@ -1,4 +1,4 @@
-//! People as solids: flesh, clothes, hair and carried things, on a skeleton.
+//! People as solids: body, clothes, hair and carried objects, on a skeleton.
 
 use nalgebra::{Point3, Rotation3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -9,48 +9,48 @@ use crate::posture::Posture;
 use crate::random::Random;
 use crate::shape::{Form, Shape};
 
-/// Clothes and carried things of a person.
+/// Clothes and carried objects of a person.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outfit {
-    /// Face and hands.
+    /// Colour of face and hands.
     pub skin: Colour,
-    /// Hair.
+    /// Colour of the hair.
     pub hair: Colour,
-    /// Hair reaches the shoulders.
+    /// True if the hair reaches the shoulders.
     pub long_hair: bool,
-    /// Body and arms.
+    /// Material of body and arms.
     pub top: Material,
-    /// Legs.
+    /// Material of the legs.
     pub trousers: Material,
-    /// Feet.
+    /// Material of the feet.
     pub shoes: Material,
-    /// Things put on over it.
+    /// Additional clothes and objects.
     pub extras: Vec<Extra>,
 }
 
-/// Something that changes a silhouette.
+/// Object or piece of clothing that changes the silhouette.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Extra {
-    /// A coat down to the knees, of the top's cloth.
+    /// A coat down to the knees, of the cloth of the top.
     Coat,
     /// A backpack.
     Backpack,
     /// A brimmed hat.
     Hat,
-    /// A brimmed hat of a green that nothing else has: webcams find it.
+    /// A brimmed hat in a green that nothing else has, by which webcams find the person.
     GreenHat,
     /// A bag in the left hand.
     Bag,
-    /// A suitcase on wheels, drawn along by the right hand.
+    /// A suitcase on wheels, pulled with the right hand.
     Trolley,
-    /// A poncho from the shoulders down to the thighs, of the top's cloth.
+    /// A poncho from the shoulders down to the thighs, of the cloth of the top.
     Poncho,
-    /// An open laptop before the chest.
+    /// An open laptop in front of the chest.
     Laptop,
 }
 
-/// Random numbers that only subjects are drawn from.
+/// Stream of random numbers that is used for subjects only.
 const SUBJECT_STREAM: u64 = 7;
 const SKINS: &[Colour] = &[
     [0.62, 0.42, 0.33],
@@ -95,7 +95,7 @@ impl Outfit {
             (Extra::Bag, 0.15),
             (Extra::Trolley, 0.07),
         ];
-        // Dyes that look black reflect infrared, carbon black does not.
+        // Dyes that look black reflect infrared, but carbon black does not.
         let infrared = if random.chance(0.12) { 0.06 } else { random.between(0.3, 0.8) };
         Self {
             skin: random.pick(SKINS),
@@ -110,7 +110,7 @@ impl Outfit {
     }
 }
 
-/// A person to draw.
+/// A person to be rendered.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Person {
     /// The size.
@@ -120,14 +120,14 @@ pub struct Person {
 }
 
 impl Person {
-    /// Creates a person of the population: the same number is the same person.
+    /// Returns a person of the population: the same number gives the same person.
     pub fn subject(number: u64) -> Self {
         let mut random = Random::new(number, SUBJECT_STREAM);
         Self { build: Build::random(&mut random), look: Outfit::random(&mut random) }
     }
 
-    /// The solids of the person, those of the upper body (head, trunk above the
-    /// hips, arms) first; also how many these are.
+    /// Returns the solids of the person, those of the upper body (head, trunk above the hips, arms)
+    /// first, and the number of these.
     pub fn shapes(&self, skeleton: &Skeleton) -> (Vec<Shape>, usize) {
         let mut drawing = Drawing {
             s: skeleton,
@@ -152,7 +152,7 @@ impl Person {
 struct Drawing<'a> {
     s: &'a Skeleton,
     h: f64,
-    /// Height times breadth: for widths.
+    /// Height times breadth, for widths.
     w: f64,
     look: &'a Outfit,
     shapes: Vec<Shape>,
@@ -287,7 +287,7 @@ impl Drawing<'_> {
         self.limb(collar, hem, 0.085 * w, 0.17 * w, self.look.top);
     }
 
-    /// The keyboard lies before the chest, the screen stands at its far edge.
+    /// Adds a laptop: the keyboard in front of the chest, the screen at its far edge.
     fn laptop(&mut self) {
         let turn = self.s.world_from_thorax;
         let [low, high] = [(0.15, -0.14), (0.225, -0.075)]
@@ -297,7 +297,7 @@ impl Drawing<'_> {
         let keys = Form::Block(Vector3::new(0.12, 0.17, 0.01));
         let screen = Form::Block(Vector3::new(0.008, 0.17, 0.11));
         self.shapes.push(Shape::new(keys, low, turn, shell));
-        // Glass returns hardly any projected dots.
+        // Glass returns almost no projected dots.
         self.shapes.push(Shape::new(screen, high, turn, glass.with_infrared(0.03)));
     }
 
@@ -336,7 +336,7 @@ impl Drawing<'_> {
         self.shapes.push(Shape::new(form, at, self.s.world_from_head, glass));
     }
 
-    /// Leans behind the right hand, to which its handle reaches.
+    /// Adds a trolley that leans behind the right hand, which holds its handle.
     fn trolley(&mut self) {
         let turn = self.s.world_from_pelvis * Rotation3::from_axis_angle(&Vector3::y_axis(), 0.55);
         let hand = self.s.wrists[1];

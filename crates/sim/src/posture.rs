@@ -10,8 +10,9 @@ pub enum Posture {
     Upright,
     /// Looks down at a phone while standing and walking.
     Phone,
-    /// Sits on a chair at the first point of the path; with more points, gets up by `start_s`.
+    /// Sits on a chair at the first point of the path; if there are more points, gets up at
+    /// `start_s`.
     Seated,
-    /// Bends down now and then while standing.
+    /// Bends down from time to time while standing.
     Bending,
 }

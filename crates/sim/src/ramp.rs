@@ -1,11 +1,11 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Floor that rises along the length of the room, and is level before and after that.
+/// Floor that rises along the length of the room, and is level before and after the ramp.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Ramp {
-    /// Where it begins, m from the near end of the room.
+    /// Start of the ramp, m from the near end of the room.
     pub from_m: f64,
     /// Length along the room, m.
     pub length_m: f64,
@@ -14,12 +14,12 @@ pub struct Ramp {
 }
 
 impl Ramp {
-    /// Returns the height of the floor at this place along the room, m.
+    /// Returns the height of the floor at this position along the room, m.
     pub(crate) fn height_m(&self, x: f64) -> f64 {
         self.rise_m * ((x - self.from_m) / self.length_m).clamp(0.0, 1.0)
     }
 
-    /// Returns the rules that its numbers obey, with the message of the refusal.
+    /// Returns the conditions on the settings, each with the message for a violation.
     pub(crate) fn rules(&self) -> [(bool, &'static str); 2] {
         [
             (self.from_m >= 0.0 && self.length_m > 0.0, "room.ramp must have a place and a length"),

@@ -35,22 +35,22 @@ impl Random {
         self.0.pick(of)
     }
 
-    /// Returns a whole number from 0 to below `end`, which must not be 0.
+    /// Returns an integer from 0 to below `end`, which must not be 0.
     pub fn below(&mut self, end: u64) -> u64 {
         self.0.below(end)
     }
 }
 
-// Without checks for an overflow, so that loops over pixels become vector instructions.
+// Without overflow checks, so that loops over pixels become vector instructions.
 
-/// Returns a number that is uniform in [0, 1) and depends on seed and key only.
+/// Returns a number that is uniform in [0, 1) and depends only on seed and key.
 #[inline(always)]
 pub(crate) fn uniform_at(seed: u64, key: u64) -> f64 {
     (number_at(seed, key) >> 11) as f64 / (1u64 << 53) as f64
 }
 
-/// Returns a nearly normal number with variance one (the sum of four uniform ones) that depends on
-/// seed and key only: for the noise of pixels, which has short tails anyway.
+/// Returns a nearly normal number with variance one (the sum of four uniform ones) that depends
+/// only on seed and key: for the noise of pixels, which has short tails anyway.
 #[inline(always)]
 pub(crate) fn normal_at(seed: u64, key: u64) -> f64 {
     let bits = number_at(seed, key);
@@ -58,11 +58,11 @@ pub(crate) fn normal_at(seed: u64, key: u64) -> f64 {
         .wrapping_add(bits >> 16 & 0xffff)
         .wrapping_add(bits >> 32 & 0xffff)
         .wrapping_add(bits >> 48 & 0xffff);
-    // Of 18 bits, and numbers of 32 have vector instructions for the conversion.
+    // The sum has 18 bits, and 32-bit integers have vector instructions for the conversion.
     (f64::from(sum as i32) / 65_536.0 - 2.0) * SQRT_3
 }
 
-/// Makes the variance of the sum of four uniform numbers one.
+/// Factor that makes the variance of the sum of four uniform numbers one.
 const SQRT_3: f64 = 1.732_050_807_568_877_2;
 
 #[cfg(test)]

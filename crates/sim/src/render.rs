@@ -1,7 +1,6 @@
-//! Casts a ray through every pixel. The image is divided into tiles; a tile
-//! looks only at the solids that reach into the pyramid behind it, nearest first.
-//! Strips of tiles do not depend on each other, so that any number of threads
-//! draws the same image.
+//! Casts a ray through every pixel. The image is divided into tiles; a tile tests only the solids
+//! that intersect the pyramid behind it, nearest first. Strips of tiles are independent of each
+//! other, so that any number of threads renders the same image.
 
 use nalgebra::{Isometry3, Matrix3, Point2, Point3, Vector3};
 use tagalong_geometry::{Camera, Distortion, Lens, Pinhole};
@@ -18,8 +17,8 @@ use crate::world::World;
 /// Side of a tile, pixels.
 const TILE: usize = LANES;
 
-/// Renders the world as seen by a camera without any noise: for each pixel the surface that its ray
-/// meets, where `t` is the depth along the optical axis in metres.
+/// Renders the world as seen by a camera, without noise: for each pixel the surface that its ray
+/// hits, where `t` is the depth along the optical axis in metres.
 pub fn draw(
     world: &World,
     camera: &Camera,
@@ -35,24 +34,23 @@ pub struct WorldCamera<'a> {
     pub world: &'a World,
     /// The camera.
     pub camera: &'a Camera,
-    /// The robot in the world when a part of the image is taken: the upper edge
-    /// is 0, the lower 1.
+    /// Pose of the robot in the world when a part of the image is exposed: the upper edge is 0, the
+    /// lower 1.
     pub pose: &'a (dyn Fn(f64) -> Isometry3<f64> + Sync),
-    /// Without it there are no colours, and the image is drawn several times
-    /// faster.
+    /// If false, there are no colours, and the image is rendered several times faster.
     pub lit: bool,
 }
 
 impl WorldCamera<'_> {
-    /// Renders the surface that the ray of each pixel meets.
+    /// Renders the surface that the ray of each pixel hits.
     pub fn draw(&self, threads: usize) -> HitImage {
         let mut image = HitImage::nothing(self.camera.width, self.camera.height);
         self.draw_over(&mut image, threads);
         image
     }
 
-    /// Renders the surface that the ray of each pixel meets over an earlier image of the same size,
-    /// which saves the time that new memory takes.
+    /// Renders the surface that the ray of each pixel hits into an existing image of the same size,
+    /// which saves the time for allocating memory.
     pub fn draw_over(&self, image: &mut HitImage, threads: usize) {
         let strip = TILE * image.row_groups();
         in_pieces(image.groups_mut(), strip, threads, |number, groups| {
@@ -81,13 +79,14 @@ impl WorldCamera<'_> {
         }
     }
 
-    /// Returns the robot in the world while a row is taken: where a point appears depends on when
-    /// its row is taken, and the other way round, so that callers look for it at 0.5 first.
+    /// Returns the pose of the robot in the world while a row is exposed. The position of a point
+    /// depends on the exposure time of its row, and the row on the position, so callers first try
+    /// 0.5.
     pub fn pose_at(&self, row: f64) -> Isometry3<f64> {
         (self.pose)((row / self.camera.height as f64).clamp(0.0, 1.0))
     }
 
-    /// The eye while the strip with a row is taken.
+    /// Returns the eye while the strip with this row is exposed.
     fn eye(&self, row: usize) -> Eye<'_> {
         let top = row - row % TILE;
         let height = self.camera.height;
@@ -96,8 +95,8 @@ impl WorldCamera<'_> {
     }
 
     /// Compares the visible part of some solids of `person` within an area (left, top, right,
-    /// bottom, pixels, clipped to the image by the caller) with the view of them alone. At most
-    /// some 40 x 40 rays are cast.
+    /// bottom, pixels, clipped to the image by the caller) with the view of these solids alone. At
+    /// most some 40 x 40 rays are cast.
     pub fn visibility(
         &self,
         image: &HitImage,
@@ -114,7 +113,7 @@ impl WorldCamera<'_> {
         let mut eye = self.eye(top);
         let mut alone = views(shapes, &eye.at);
         for row in (top..bottom).step_by(step) {
-            // All rows of a strip are seen from one place.
+            // All rows of a strip are seen from the same pose.
             if row / TILE != strip {
                 strip = row / TILE;
                 eye = self.eye(row);
@@ -148,7 +147,7 @@ impl WorldCamera<'_> {
         Visibility { fraction, bounds_px: bounds, occluder }
     }
 
-    /// Renders what the rays of a tile meet, into the group of each of its rows.
+    /// Renders the hits of the rays of a tile into the group of each of its rows.
     fn paint(
         &self,
         tile: &mut Tile,
@@ -179,7 +178,7 @@ impl WorldCamera<'_> {
                 let wanted = batch.wanted();
                 let of = &shape.material;
                 self.world.shine(of, &batch.points, &surface, &wanted, (shading, self.lit), to);
-                // Nearly all surfaces show themselves, without a look at normals and rays.
+                // Nearly all surfaces are opaque, so that normals and rays need not be computed.
                 if !of.shows_itself() {
                     for lane in 0..batch.count {
                         let view = (eye, &batch.rays.at(lane));
@@ -197,12 +196,12 @@ impl WorldCamera<'_> {
     }
 }
 
-/// Returns solids as they are seen from an eye.
+/// Returns the solids as seen from an eye.
 fn views(of: &[Shape], eye: &Point3<f64>) -> Vec<SolidView> {
     of.iter().map(|shape| shape.seen_from(eye)).collect()
 }
 
-/// One for each ray that meets some of these solids.
+/// Returns one for each ray that hits any of these solids.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn meet_any(solids: &[SolidView], rays: &Vectors) -> [u64; LANES] {
     let mut met = [0; LANES];
@@ -210,8 +209,8 @@ fn meet_any(solids: &[SolidView], rays: &Vectors) -> [u64; LANES] {
     met
 }
 
-/// Rays of depth one of a lens without distortion, in the axes that `turn` leads to, from a column
-/// on, some columns apart, of a row.
+/// Returns rays of depth one through some columns of a row, for a lens without distortion, rotated
+/// by `turn`.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn straight_rays(
     lens: &Pinhole,
@@ -223,14 +222,14 @@ fn straight_rays(
     let step = step as f64;
     let y = (row as f64 - lens.cy) / lens.fy;
     for lane in 0..LANES {
-        // Columns are whole numbers, so that this is exact.
+        // Column numbers are integers, so this is exact.
         let column = left + step * lane as f64;
         let ray = Vector3::new((column - lens.cx) / lens.fx, y, 1.0);
         to.set(lane, &product(turn, &ray));
     }
 }
 
-/// Where a camera stands and looks.
+/// Position and orientation of a camera.
 struct Eye<'a> {
     camera: &'a Camera,
     at: Point3<f64>,
@@ -248,7 +247,7 @@ impl<'a> Eye<'a> {
         self.world_from_camera * self.camera.ray(Point2::new(column, row))
     }
 
-    /// Writes the rays of a row, from a column on, some columns apart.
+    /// Writes the rays of a row, starting at a column, with this step between columns.
     fn rays(&self, [left, step, row]: [usize; 3], to: &mut Vectors) {
         match &self.camera.lens {
             Lens::Pinhole(lens) if lens.distortion == Distortion::None => {
@@ -262,7 +261,7 @@ impl<'a> Eye<'a> {
         }
     }
 
-    /// The ray through the upper left corner of a pixel.
+    /// Returns the ray through the upper left corner of a pixel.
     fn corner(&self, column: usize, row: usize) -> Vector3<f64> {
         self.ray(column as f64 - 0.5, row as f64 - 0.5)
     }
@@ -275,7 +274,7 @@ impl<'a> Eye<'a> {
 /// Visible part of some solids of a person in an image.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Visibility {
-    /// Visible fraction of the view without other objects; 0 where that is empty.
+    /// Visible fraction of the view without other objects; 0 if that view is empty.
     pub fraction: f64,
     /// Left, upper, right and lower edge of the visible part, pixels.
     pub bounds_px: Option<[f64; 4]>,

@@ -1,5 +1,5 @@
-//! A differential drive that answers late and slowly, along a path or steered
-//! from outside, and the odometry that believes its encoders.
+//! A differential drive that responds with delay and lag, on a path or under external control, and
+//! the odometry computed from its encoders.
 
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
@@ -12,15 +12,15 @@ use crate::scene::RobotSettings;
 
 /// A point of the path is reached at this distance, m.
 const REACHED_M: f64 = 0.2;
-/// Nods by this much per m/s² of braking, rad.
+/// Pitch per m/s² of braking, rad.
 const NOD_RAD: f64 = 0.008;
-/// Time constant of the nod, s.
+/// Time constant of the pitch, s.
 const NOD_S: f64 = 0.15;
 
 /// Reading of a wheel's encoder.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Encoder {
-    /// Turned since the start, in whole ticks, rad.
+    /// Angle since the start, in whole ticks, rad.
     pub angle_rad: f64,
     /// Speed, rad/s.
     pub rate_rad_s: f64,
@@ -29,13 +29,13 @@ pub struct Encoder {
 /// State of wheels that may fail.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WheelFaults {
-    /// They stand, whatever is commanded.
+    /// The wheels do not move, whatever is commanded.
     pub stuck: bool,
-    /// They go on with the command of before.
+    /// The wheels continue with the previous command.
     pub runaway: bool,
-    /// Part of their travel that reaches the ground.
+    /// Fraction of their travel that reaches the ground.
     pub grip: f64,
-    /// From a command to its effect, s, instead of that of the settings.
+    /// Time from a command to its effect, s, instead of that of the settings.
     pub latency_s: Option<f64>,
 }
 
@@ -49,24 +49,24 @@ impl Default for WheelFaults {
 #[derive(Clone, Debug)]
 pub struct Robot {
     settings: RobotSettings,
-    /// Where it really is in the world.
+    /// True pose in the world.
     pub pose: Isometry2<f64>,
-    /// Where its odometry believes to be, in a frame that starts at zero.
+    /// Pose according to the odometry, in a frame that starts at zero.
     pub odometry: Isometry2<f64>,
     /// Speeds of the rims of the wheels, m/s.
     wheels: [f64; 2],
     /// Speeds that the encoders measure, m/s.
     measured: [f64; 2],
-    /// The same since the start, m.
+    /// Distances that the encoders measure since the start, m.
     travelled: [f64; 2],
-    /// Wheels that are larger than believed, as factors.
+    /// Ratios of the true wheel radii to the nominal one.
     radius: [f64; 2],
     half_separation_m: f64,
     commands: VecDeque<(f64, WheelSpeeds)>,
-    /// The last command, which may not work yet.
+    /// The last command, which may not be in effect yet.
     given: WheelSpeeds,
     command: WheelSpeeds,
-    /// The last command that has reached the wheels, which run away from it.
+    /// The last command that has reached the wheels, which a runaway continues.
     arrived: WheelSpeeds,
     faults: WheelFaults,
     steered: bool,
@@ -76,10 +76,10 @@ pub struct Robot {
 }
 
 impl Robot {
-    /// A robot at rest at its start.
+    /// Creates a robot at rest at its start.
     pub fn new(settings: &RobotSettings, mut random: Random) -> Self {
         let bias = settings.wheel_bias;
-        // Wheels are never quite of the nominal size, so the odometry has a bias.
+        // Wheels never have exactly the nominal size, so the odometry has a bias.
         let [left, right, separation] = [0, 1, 2].map(|_| 1.0 + bias * random.normal());
         let start = Vector2::from(settings.start);
         Self {
@@ -103,14 +103,14 @@ impl Robot {
         }
     }
 
-    /// Commands wheel speeds from outside; from then on the path is left alone.
+    /// Commands wheel speeds from outside; from then on the path is ignored.
     pub fn steer(&mut self, now_s: f64, command: WheelSpeeds) {
         self.steered = true;
         self.give(now_s, command);
     }
 
-    /// Sets the command that leads along the path, or after a person at `leader`, unless a caller
-    /// steers.
+    /// Sets the command that leads along the path, or that follows a person at `leader`, unless a
+    /// caller steers.
     pub fn decide(&mut self, now_s: f64, leader: Option<Point2<f64>>) {
         if self.steered {
             return;
@@ -133,7 +133,7 @@ impl Robot {
         self.faults = faults;
     }
 
-    /// Moves by a short time.
+    /// Moves the robot by a time step.
     pub fn step(&mut self, now_s: f64, dt: f64) {
         while let Some(command) = self.commands.front().filter(|c| c.0 <= now_s).map(|c| c.1) {
             self.arrived = command;
@@ -147,7 +147,7 @@ impl Robot {
 
     fn drive(&mut self, dt: f64) {
         let before = self.speed_mps();
-        // A step shorter than the response time gives a first-order lag; a longer one ends at the
+        // A step shorter than the response time gives a first-order lag; a longer one reaches the
         // target.
         let part = dt / self.settings.response_s.max(dt);
         let targets = [self.command.left, self.command.right];
@@ -157,7 +157,7 @@ impl Robot {
             if self.faults.stuck {
                 *wheel = 0.0;
             }
-            // The wheel slips; the encoder sees the wheel and not the ground.
+            // The wheel slips, but the encoder measures the wheel and not the ground.
             *measured = *wheel / radius * (1.0 + self.settings.slip * self.random.normal());
         }
         for (travelled, measured) in self.travelled.iter_mut().zip(self.measured) {
@@ -166,16 +166,16 @@ impl Robot {
         let acceleration = (self.speed_mps() - before) / dt;
         self.nod_rad += (-NOD_RAD * acceleration - self.nod_rad) * (dt / NOD_S).min(1.0);
         self.pose = self.pose_after(dt);
-        // By the nominal separation, because the odometry does not know the true one.
+        // With the nominal separation, because the odometry does not know the true one.
         self.odometry *= moved(self.measured, self.settings.half_separation_m, dt);
     }
 
-    /// Where it is after a short time, or was before it, at the speed of now.
+    /// Returns the pose after a short time, or before it if negative, at the present speed.
     pub fn pose_after(&self, dt: f64) -> Isometry2<f64> {
         self.pose * moved(self.over_ground(), self.half_separation_m, dt)
     }
 
-    /// Speeds that lead to the point ahead.
+    /// Returns the speeds that lead to the next point of the path.
     fn along_path(&mut self) -> WheelSpeeds {
         let Some(goal) = self.settings.path.get(self.ahead).copied().map(Point2::from) else {
             return WheelSpeeds::STOP;
@@ -188,12 +188,12 @@ impl Robot {
         self.towards(goal, if last { 0.0 } else { f64::NEG_INFINITY })
     }
 
-    /// Speeds that lead to a point and stop so far from it.
+    /// Returns the speeds that lead to a point and stop at this distance from it.
     fn towards(&self, goal: Point2<f64>, away_m: f64) -> WheelSpeeds {
         let way = self.pose.inverse_transform_point(&goal).coords;
         let off = way.y.atan2(way.x);
         let limit = (way.norm() - away_m).max(0.0);
-        // A robot that faces away turns first: the cosine stops it.
+        // A robot that faces away turns first: the cosine reduces its speed to zero.
         let speed = self.settings.speed_mps.min(limit) * off.cos().max(0.0).powi(2);
         let turn = (1.6 * off).clamp(-0.9, 0.9) * self.settings.half_separation_m;
         WheelSpeeds { left: speed - turn, right: speed + turn }
@@ -204,24 +204,24 @@ impl Robot {
         self.wheels.map(|wheel| wheel * self.faults.grip)
     }
 
-    /// Forward, over ground, m/s.
+    /// Returns the forward speed over ground, m/s.
     pub fn speed_mps(&self) -> f64 {
         let [left, right] = self.over_ground();
         0.5 * (left + right)
     }
 
-    /// About the vertical, rad/s.
+    /// Returns the turn rate about the vertical, rad/s.
     pub fn turn_rate(&self) -> f64 {
         let [left, right] = self.over_ground();
         (right - left) / (2.0 * self.half_separation_m)
     }
 
-    /// Forward speed, m/s, and turn rate, rad/s, as the encoders see them.
+    /// Returns the forward speed, m/s, and the turn rate, rad/s, that the encoders measure.
     pub fn measured(&self) -> (f64, f64) {
         self.planar(self.measured)
     }
 
-    /// Forward speed, m/s, and turn rate, rad/s, of the last command.
+    /// Returns the forward speed, m/s, and the turn rate, rad/s, of the last command.
     pub fn commanded(&self) -> (f64, f64) {
         self.planar([self.given.left, self.given.right])
     }
@@ -241,13 +241,13 @@ impl Robot {
         })
     }
 
-    /// Nose down, rad.
+    /// Returns the pitch, rad, positive with the nose down.
     pub fn nod_rad(&self) -> f64 {
         self.nod_rad
     }
 }
 
-/// The motion of wheels at these speeds.
+/// Returns the motion of wheels at these speeds.
 fn moved([left, right]: [f64; 2], half_separation_m: f64, dt: f64) -> Isometry2<f64> {
     EgoMotion::from_wheels(left, right, &DiffDrive { half_separation_m, slip: 0.0 }, dt).isometry()
 }

@@ -23,11 +23,11 @@ const WALL_M: f64 = 0.1;
 const DOOR_M: [f64; 2] = [0.45, 2.02];
 /// Depth of the room behind an open door, m.
 const BEHIND_M: f64 = 1.8;
-/// Furniture is at least this far from everybody's way, m.
+/// Minimum distance of furniture from all paths, m.
 const OFF_THE_WAY_M: f64 = 0.75;
-/// So often a free place is looked for.
+/// Number of attempts to find a free position.
 const TRIES: usize = 40;
-/// Coats, jackets, shades.
+/// Colours of coats, jackets and shades.
 const CLOTHS: &[Colour] = &[
     [0.09, 0.10, 0.16],
     [0.28, 0.09, 0.07],
@@ -37,7 +37,7 @@ const CLOTHS: &[Colour] = &[
     [0.42, 0.40, 0.36],
 ];
 
-/// Floor, ceiling, walls and a door.
+/// Returns floor, ceiling, walls and a door.
 pub fn room(settings: &RoomSettings) -> Object {
     let [x, y] = settings.size_m;
     let z = settings.height_m;
@@ -89,7 +89,7 @@ pub fn room(settings: &RoomSettings) -> Object {
     Object::new(shapes, None, false)
 }
 
-/// Returns a level block that is thicker by a wall than its sides, m.
+/// Returns a level block that extends beyond its sides by the thickness of a wall, m.
 fn wall_slab(centre: [f64; 3], sides: [f64; 3], of: Material) -> Shape {
     let sides = Vector3::from(sides) * 0.5 + Vector3::repeat(0.5 * WALL_M);
     Shape::new(Form::Block(sides), Point3::from(centre), Rotation3::identity(), of)
@@ -125,7 +125,7 @@ fn floor(kind: Floor) -> Material {
     }
 }
 
-/// A closed door with its frame on the wall at the far end.
+/// Returns a closed door with its frame on the wall at the far end.
 fn door(x: f64, y: f64) -> Vec<Shape> {
     let still = Rotation3::identity();
     let mut shapes = door_frame([x, y], &still);
@@ -140,7 +140,7 @@ fn door(x: f64, y: f64) -> Vec<Shape> {
     shapes
 }
 
-/// Jambs and lintel of a doorway across X.
+/// Returns jambs and lintel of a doorway across X.
 fn door_frame(at: [f64; 2], turn: &Rotation3<f64>) -> Vec<Shape> {
     let [side, top] = DOOR_M;
     [
@@ -155,7 +155,7 @@ fn door_frame(at: [f64; 2], turn: &Rotation3<f64>) -> Vec<Shape> {
     .into()
 }
 
-/// Lamps in a row below the ceiling, bright enough together.
+/// Returns lamps in a row below the ceiling that together give the wanted brightness.
 pub fn lamps(room: &RoomSettings, light: &LightSettings) -> Vec<Lamp> {
     let [x, y] = room.size_m;
     let z = room.height_m - 0.15;
@@ -169,8 +169,8 @@ pub fn lamps(room: &RoomSettings, light: &LightSettings) -> Vec<Lamp> {
     lamps
 }
 
-/// Random pieces along the walls, off the ways of robot and people and off each
-/// other; a piece for which there is no place is left out.
+/// Returns random pieces along the walls, away from the paths of robot and people and from each
+/// other; a piece without a free position is left out.
 pub fn clutter(scene: &Scene, random: &mut Random) -> Vec<Furniture> {
     let mut ways: Vec<Vec<Point2<f64>>> = vec![
         [scene.robot.start].iter().chain(&scene.robot.path).map(|p| Point2::from(*p)).collect(),
@@ -219,7 +219,7 @@ fn random_piece(room: &RoomSettings, random: &mut Random) -> Furniture {
     Furniture { kind: random.pick(&kinds), at, heading_deg: random.between(150.0, 210.0) }
 }
 
-/// Distance of a place from a polyline of one point at least.
+/// Returns the distance of a position from a polyline with at least one point.
 pub fn distance(way: &[Point2<f64>], place: &Point2<f64>) -> f64 {
     let to_segments = way.windows(2).map(|pair| {
         let along = pair[1] - pair[0];
@@ -230,14 +230,14 @@ pub fn distance(way: &[Point2<f64>], place: &Point2<f64>) -> f64 {
     to_segments.chain(to_points).fold(f64::INFINITY, f64::min)
 }
 
-/// Returns the obstacles that people walk around.
+/// Returns the obstacles around which people walk.
 pub fn obstacles(piece: &Furniture) -> Vec<Obstacle> {
     let turn = Rotation2::new(piece.heading_deg.to_radians());
-    // Offset aside and radius of each disc, m.
+    // Lateral offset and radius of each disc, m.
     let discs: &[(f64, f64)] = match piece.kind {
         FurnitureKind::Desk => &[(0.0, 0.75)],
         FurnitureKind::Shelf => &[(0.0, 0.45)],
-        // The jambs are thin: people keep to the middle anyway.
+        // The jambs are thin, and people keep to the middle anyway.
         FurnitureKind::Doorway => {
             &[(0.6, 0.05), (-0.6, 0.05), (0.85, 0.2), (-0.85, 0.2), (1.1, 0.2), (-1.1, 0.2)]
         }
@@ -256,7 +256,7 @@ pub fn obstacles(piece: &Furniture) -> Vec<Obstacle> {
 }
 
 /// Returns the solids of a piece of furniture. Its cloth, tone, size, proportions and parts are
-/// random: no two pieces of a kind are the same.
+/// random, so that no two pieces of a kind are the same.
 pub fn furniture(piece: &Furniture, ceiling_m: f64, random: &mut Random) -> Object {
     let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), piece.heading_deg.to_radians());
     let cloth = random.pick(CLOTHS);
@@ -287,26 +287,26 @@ pub fn furniture(piece: &Furniture, ceiling_m: f64, random: &mut Random) -> Obje
     Object::new(maker.shapes, None, true)
 }
 
-/// Puts solids together in the axes of a piece of furniture: X is its front.
+/// Builder of the solids of a piece of furniture, in its axes: X points to its front.
 struct Maker {
     at: [f64; 2],
     turn: Rotation3<f64>,
     cloth: Colour,
     wood: Colour,
-    /// Height as a multiple of the ordinary one.
+    /// Height as a multiple of the usual one.
     size: f64,
-    /// The chance that proportions and parts depend on.
+    /// Random numbers for proportions and parts.
     form: Random,
     shapes: Vec<Shape>,
 }
 
 impl Maker {
-    /// A proportion between two others.
+    /// Returns a random proportion between two others.
     fn between(&mut self, low: f64, high: f64) -> f64 {
         self.form.between(low, high)
     }
 
-    /// True for a part that is there with this probability.
+    /// Returns true with this probability, for a part that may be missing.
     fn has(&mut self, probability: f64) -> bool {
         self.form.chance(probability)
     }
@@ -331,7 +331,7 @@ impl Maker {
         self.shapes.push(Shape::limb(ends, (radii[0], radii[1]), forward, of));
     }
 
-    /// A pole with a coat, which hangs as it was hung, or a second one, and a hat or none.
+    /// Adds a pole with a coat in a random position, perhaps a second one, and perhaps a hat.
     fn coat_stand(&mut self) {
         let wood = Material::plain(self.wood);
         let top = 1.72 * self.size * self.between(0.94, 1.12);
@@ -350,7 +350,7 @@ impl Maker {
         }
     }
 
-    /// A coat that hangs from a height: shoulders aslant, sleeves of their own.
+    /// Adds a coat that hangs at this height: slanted shoulders, separate sleeves.
     fn coat(&mut self, aside: f64, shoulder: f64) {
         let cloth = Material::plain(self.cloth);
         let (broad, slant) = (self.between(0.75, 1.2), self.between(-0.05, 0.05));
@@ -368,7 +368,7 @@ impl Maker {
         }
     }
 
-    /// Round or square.
+    /// Adds a pillar, round or square.
     fn pillar(&mut self, ceiling_m: f64) {
         let (stone, half) = (Material::plain([0.55; 3]), 0.21 * self.size * self.between(0.7, 1.3));
         if self.has(0.7) {
@@ -387,7 +387,7 @@ impl Maker {
         self.block([-0.2, 0.0, 0.68], [0.02, 0.2, 0.24], wood);
     }
 
-    /// The jacket hangs over all of the back, or slips to one side.
+    /// Adds a chair with a jacket that covers the whole back, or has slipped to one side.
     fn draped_chair(&mut self) {
         let jacket =
             Material::patterned(self.cloth, scaled(self.cloth, 0.7), Pattern::Mottled(0.05));
@@ -402,7 +402,7 @@ impl Maker {
         self.ellipsoid([-0.23, slip, back - 0.75 * long], [0.08, 0.25 * broad, long], jacket);
     }
 
-    /// A bin with a round lid, or an open one.
+    /// Adds a bin with a round lid, or an open one.
     fn bin_on_table(&mut self) {
         let (wood, tin) = (Material::plain(self.wood), Material::plain(self.cloth));
         let (half, table) = (self.between(0.24, 0.38), self.between(0.62, 0.80));
@@ -443,7 +443,7 @@ impl Maker {
         }
     }
 
-    /// A hump with the breadth of shoulders.
+    /// Adds a hump as wide as shoulders.
     fn blanket(&mut self) {
         let wool = Material::patterned(self.cloth, scaled(self.cloth, 1.4), Pattern::Checks(0.11));
         self.chair();
@@ -453,7 +453,7 @@ impl Maker {
         self.limb([-0.15, slip, top - broad], [0.0, slip, 0.1], [broad, 1.3 * broad], wool);
     }
 
-    /// Cloth beside a pole, which reaches as high as a tall person or beyond.
+    /// Adds cloth beside a pole, as high as a tall person or higher.
     fn flag(&mut self) {
         let (top, long) = (self.between(1.8, 2.3), self.between(0.7, 1.1));
         let (wide, metal) = (self.between(0.12, 0.25), Material::plain(METAL));
@@ -464,7 +464,7 @@ impl Maker {
         self.ellipsoid([0.02, 0.8 * wide, top - 0.5 * long], [0.06, wide, 0.55 * long], stripes);
     }
 
-    /// A shade or a globe, above the foot or on an arm beside it.
+    /// Adds a shade or a globe, above the foot or on an arm beside it.
     fn floor_lamp(&mut self) {
         let (metal, cloth) = (Material::plain(METAL), Material::plain([0.75, 0.66, 0.45]));
         let top = 1.66 * self.size * self.between(0.9, 1.1);
@@ -483,7 +483,7 @@ impl Maker {
         }
     }
 
-    /// Leaves all around a stem, more or fewer, up or out.
+    /// Adds leaves around a stem, in random number and direction.
     fn plant(&mut self) {
         let pot = Material::plain([0.40, 0.18, 0.10]);
         let leaf =
@@ -512,7 +512,7 @@ impl Maker {
         self.limb([-0.03, 0.0, 0.0], [-0.03, 0.0, middle], [0.02, 0.02], foot);
     }
 
-    /// The outline of a person, a centimetre thick, as tall as one; an arm may be held out.
+    /// Adds the outline of a person, a centimetre thick and life-size; an arm may be held out.
     fn cardboard_figure(&mut self) {
         let (shirt, legs) = (Material::plain(self.cloth), Material::plain([0.05, 0.05, 0.07]));
         let skin = Material::plain([0.52, 0.33, 0.25]);
@@ -539,7 +539,7 @@ impl Maker {
         self.limb([-0.3, 0.0, 0.0], [-0.01, 0.0, 0.8], [0.01, 0.01], Material::plain(METAL));
     }
 
-    /// A flat ellipse across the front, between two points.
+    /// Adds a flat ellipse across the front, between two points.
     fn slat(&mut self, from: [f64; 3], to: [f64; 3], half_m: f64, of: Material) {
         let (from, to) = (Vector3::from(from), Vector3::from(to));
         let way = to - from;
@@ -555,7 +555,7 @@ impl Maker {
         for (x, y) in [(-0.37, -0.7), (-0.37, 0.7), (0.37, -0.7), (0.37, 0.7)] {
             self.limb([x, y, 0.0], [x, y, 0.72], [0.025, 0.025], Material::plain(METAL));
         }
-        // Glass returns hardly any projected dots.
+        // Glass returns almost no projected dots.
         self.block([-0.1, 0.0, 1.06], [0.02, 0.29, 0.18], screen.with_infrared(0.03));
         self.limb([-0.1, 0.0, 0.74], [-0.1, 0.0, 1.0], [0.03, 0.03], Material::plain(METAL));
     }

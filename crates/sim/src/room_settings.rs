@@ -14,15 +14,15 @@ settings! {
         /// Height, m.
         #[schemars(range(min = 2.0, max = 20.0))]
         pub height_m: f64 = 2.8,
-        /// The walls have wallpaper; without it stereo finds nothing on them.
+        /// If true, the walls have wallpaper; otherwise stereo finds no texture on them.
         pub wallpaper: bool = false,
-        /// The floor.
+        /// Material of the floor.
         pub floor: Floor = Floor::Planks,
-        /// Pieces of furniture of any kind at random places along the walls, off
-        /// everybody's way.
+        /// Number of pieces of furniture of any kind at random positions along the walls, away from
+        /// all paths.
         #[schemars(range(max = 500))]
         pub clutter: usize = 0,
-        /// The door at the far end stands open to a dark room.
+        /// If true, the door at the far end is open to a dark room.
         pub open_door: bool = false,
         /// A ramp across the room; without it the floor is level.
         pub ramp: Option<Ramp>,
@@ -30,7 +30,7 @@ settings! {
 }
 
 impl RoomSettings {
-    /// Returns the height of the floor at a place, m.
+    /// Returns the height of the floor at a position, m.
     pub fn floor_m(&self, at: &Point2<f64>) -> f64 {
         self.ramp.as_ref().map_or(0.0, |ramp| ramp.height_m(at.x))
     }

@@ -1,4 +1,4 @@
-//! Scenes as TOML: everything that a simulated log depends on, the seed included.
+//! Scenes as TOML: everything on which a simulated log depends, including the seed.
 
 use crate::bench_setting::FollowBench;
 use crate::camera_settings::{CameraKind, CameraSettings};
@@ -28,18 +28,18 @@ use crate::variation::{Variant, one_scene};
 use crate::webcam::WebcamSettings;
 
 settings! {
-    /// A scene. Lengths are in metres; the room's corner is the origin, X runs
-    /// along its length, Y along its width; angles turn from X towards Y.
+    /// A scene. Lengths are in metres. The corner of the room is the origin, X runs along its
+    /// length, Y along its width; angles turn from X towards Y.
     pub struct Scene {
         /// Purpose of the scene.
         pub about: String,
-        /// Seed of all random numbers; it also decides for which purpose the log may be used, see
-        /// [`Split`].
+        /// Seed of all random numbers; it also determines for which purpose the log may be used,
+        /// see [`Split`].
         pub seed: u64 = 1,
         /// Length of the log, s.
         #[schemars(range(min = 1e-6, max = 86_400.0))]
         pub duration_s: f64 = 10.0,
-        /// Wanderers with random looks and ways, besides `people`.
+        /// Number of people with random clothes and paths, in addition to `people`.
         pub crowd: usize = 0,
         /// The room.
         pub room: RoomSettings,
@@ -49,14 +49,14 @@ settings! {
         pub camera: CameraSettings,
         /// The robot.
         pub robot: RobotSettings,
-        /// Faults on the way into the log.
+        /// Faults of the recording.
         pub faults: FaultSettings,
-        /// A laser scanner on the robot, if it has one; `laser = {}` is an ordinary one.
+        /// A laser scanner on the robot, if it has one; `laser = {}` is one with default settings.
         pub laser: Option<LaserSettings>,
         /// A 3-D lidar on the robot, if it has one; `lidar = {}` is a spinning one of 16 rings.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub lidar: Option<LidarSettings>,
-        /// Further laser scanners, as sources of obstacles.
+        /// Further laser scanners, as obstacle sources.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         pub lasers: Vec<ScannerSettings>,
         /// Sonars and infrared sensors.
@@ -65,11 +65,11 @@ settings! {
         /// Bumpers.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         pub bumpers: Vec<BumperSettings>,
-        /// Cameras that hang in the room.
+        /// Cameras mounted in the room.
         pub webcams: Vec<WebcamSettings>,
         /// Furniture.
         pub furniture: Vec<Furniture>,
-        /// Blocks of wall, which people with a walk other than `plain` find ways around.
+        /// Wall blocks, which people with a walk other than `plain` avoid.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         #[schemars(length(max = 500))]
         pub blocks: Vec<Block>,
@@ -78,12 +78,12 @@ settings! {
         /// Settings of people with a walk other than `plain`.
         #[serde(skip_serializing_if = "CrowdSettings::is_default")]
         pub reacting: CrowdSettings,
-        /// A person or a trolley that comes at the robot; none if left out.
+        /// A person or a trolley that moves towards the robot; none if left out.
         pub approach: Option<ApproachSettings>,
-        /// Room, blocks and people by the rules of the benchmark Follow-Bench.
+        /// Room, blocks and people as in the benchmark Follow-Bench.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub follow_bench: Option<FollowBench>,
-        /// Variation of the path of the first person by the seed; without it the path is the same
+        /// Variation of the path of the first person with the seed; without it the path is the same
         /// for all.
         #[serde(skip_serializing_if = "PathVariation::is_off")]
         pub variation: PathVariation,
@@ -94,13 +94,13 @@ impl Scene {
     /// Reads a scene.
     ///
     /// # Errors
-    /// An unknown key, a wrong type or an impossible value, with its place.
+    /// An unknown key, a wrong type or an impossible value, with its position.
     pub fn parse(text: &str) -> Result<Self, ConfigError> {
         Self::parse_with(text, &Variant::default())
     }
 
-    /// Reads one of the scenes that a text with a table `[vary]` describes. That
-    /// table has dotted keys and says for each where its value comes from:
+    /// Reads one of the scenes that a text with a table `[vary]` describes. That table has dotted
+    /// keys, and gives for each the source of its value:
     ///
     /// ```toml
     /// [vary]
@@ -111,10 +111,10 @@ impl Scene {
     /// room.size_m.0 = { between = [7.0, 12.0], apart = true } # no value in two splits
     /// ```
     ///
-    /// Same text, same variant, same scene; each key has a chance of its own.
+    /// The same text and variant give the same scene; each key has its own random numbers.
     ///
     /// # Errors
-    /// An unknown key, a wrong type or an impossible value, with its place.
+    /// An unknown key, a wrong type or an impossible value, with its position.
     pub fn parse_with(text: &str, variant: &Variant) -> Result<Self, ConfigError> {
         let scene = one_scene(text, variant, |mut table, seed| {
             complete_camera(&mut table);
@@ -126,15 +126,15 @@ impl Scene {
         Ok(scene.with_follow_bench().with_varied_paths())
     }
 
-    /// Returns the number of people, companions and crowd included.
+    /// Returns the number of people, including companions and crowd.
     pub fn number_of_people(&self) -> usize {
         let with_companions = self.people.iter().map(|p| 1 + p.companions);
         let comes = self.approach.iter().filter(|approach| approach.by == ApproachBy::Person);
         with_companions.fold(self.crowd + comes.count(), usize::saturating_add)
     }
 
-    /// Returns the same room with each person alone in it for `each_s`, one after the
-    /// other, from the time at which the first of them enters.
+    /// Returns the same room with each person alone in it for `each_s`, one after the other,
+    /// starting at the time when the first of them enters.
     pub fn in_turn(&self, each_s: f64) -> Self {
         let mut scene = self.clone();
         let mut now_s = scene.people.first().map_or(0.0, |person| person.enters_s);
@@ -152,7 +152,7 @@ impl Scene {
         Split::of(self.seed)
     }
 
-    /// Refuses further sensors that cannot work, and faults that cannot be injected.
+    /// Rejects further sensors that cannot work, and faults that cannot be injected.
     fn check_parts(&self) -> Result<(), String> {
         obstacle_sensors::problem(self).map_or(Ok(()), Err)?;
         self.check_faults()
@@ -223,7 +223,7 @@ impl Scene {
 const STEREO: [(&str, &str); 4] =
     [("width", "512"), ("height", "384"), ("field_of_view_deg", "100.0"), ("baseline_m", "0.12")];
 
-/// Gives a camera that only names its kind the usual settings of that kind.
+/// Gives a camera for which only the kind is set the usual settings of that kind.
 fn complete_camera(root: &mut DeTable<'_>) {
     let Some(DeValue::Table(camera)) = root.get_mut("camera").map(Spanned::get_mut) else { return };
     if camera.get("kind").and_then(|kind| kind.get_ref().as_str()) != Some("stereo") {
@@ -241,9 +241,9 @@ settings! {
     pub struct LightSettings {
         /// Illuminance of the floor below a lamp, lx.
         pub lux: f64 = 350.0,
-        /// Lamps along the room.
+        /// Number of lamps along the room.
         pub lamps: usize = 2,
-        /// Light from everywhere as a fraction of `lux`.
+        /// Ambient light as a fraction of `lux`.
         pub ambient: f64 = 0.35,
         /// Windows and the sun; without it the room has no windows.
         pub day: Option<Daylight>,
@@ -251,34 +251,35 @@ settings! {
 }
 
 settings! {
-    /// The robot and its way.
+    /// The robot and its path.
     pub struct RobotSettings {
-        /// Where it starts, m.
+        /// Start position, m.
         pub start: [f64; 2] = [1.0, 3.0],
-        /// Where it looks at the start, degrees.
+        /// Heading at the start, degrees.
         pub heading_deg: f64 = 0.0,
-        /// Corners of its outline, robot frame, m; left out, it is a disc with a radius of 0.25 m.
+        /// Corners of its outline, robot frame, m; if left out, it is a disc with a radius of 0.25
+        /// m.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         pub footprint: Vec<[f64; 2]>,
-        /// Points that it drives to one after the other; none is a robot at rest.
+        /// Points to which it drives one after the other; without any, the robot is at rest.
         pub path: Vec<[f64; 2]>,
-        /// Comes after the first person of the scene and stays this far away, m, whatever the
-        /// path; 0 keeps to the path.
+        /// If above 0, the robot follows the first person of the scene at this distance, m, and
+        /// ignores the path.
         #[schemars(range(min = 0.0, max = 20.0))]
         pub behind_m: f64 = 0.0,
         /// Speed, m/s.
         pub speed_mps: f64 = 0.5,
         /// Half the distance between the wheels, m.
         pub half_separation_m: f64 = 0.167,
-        /// Radius of the wheels, as the odometry believes, m.
+        /// Nominal radius of the wheels, as the odometry assumes, m.
         #[schemars(range(min = 0.005, max = 1.0))]
         pub wheel_radius_m: f64 = 0.0975,
-        /// Ticks of an encoder in one turn of its wheel.
+        /// Number of encoder ticks per turn of a wheel.
         #[schemars(range(min = 1))]
         pub ticks_per_turn: u32 = 4096,
         /// Time constant of the wheel speeds, s.
         pub response_s: f64 = 0.2,
-        /// From a command to its effect, s.
+        /// Time from a command to its effect, s.
         pub latency_s: f64 = 0.1,
         /// Standard deviation of the radius of each wheel and of their distance as
         /// fractions; unknown to the odometry.
@@ -290,13 +291,13 @@ settings! {
 }
 
 settings! {
-    /// Faults on the way into the log.
+    /// Faults of the recording.
     pub struct FaultSettings {
-        /// Fraction of images that never arrive.
+        /// Fraction of images that are lost.
         pub dropped: f64 = 0.01,
         /// Fraction of images that are recorded late, up to 0.15 s.
         pub late: f64 = 0.02,
-        /// Faults that begin at a time.
+        /// Faults that begin at a given time.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         pub inject: Vec<InjectedFault>,
     }
@@ -306,14 +307,14 @@ settings! {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Trick {
-    /// Nothing special.
+    /// No special behaviour.
     #[default]
     None,
     /// Turns round and goes back.
     TurnBack,
     /// Stops behind the occluding person for `hide_s`.
     Stop,
-    /// Exchanges ways with the occluding person.
+    /// Exchanges paths with the occluding person.
     Swap,
 }
 
@@ -324,66 +325,64 @@ pub enum AtEnd {
     /// Stays there.
     #[default]
     Stop,
-    /// Goes back the same way, and so on.
+    /// Goes back the same way, repeatedly.
     Return,
-    /// Goes on to the first point, and so on.
+    /// Continues to the first point, repeatedly.
     Loop,
 }
 
 settings! {
     /// A person.
     pub struct PersonSettings {
-        /// Points to walk through; the first is where they start.
+        /// Points to walk through; the first is the start.
         pub path: Vec<[f64; 2]>,
-        /// Number of points that follow the path, which the seed chooses: anywhere in the
-        /// room, off furniture and the robot's start.
+        /// Number of further points after the path, which the seed chooses: anywhere in the room,
+        /// away from furniture and the robot's start.
         #[schemars(range(max = 1000))]
         pub wander: usize = 0,
-        /// Way of walking.
+        /// Walking model.
         #[serde(skip_serializing_if = "Walk::is_plain")]
         pub walk: Walk = Walk::Plain,
         /// Preferred speed, m/s.
         #[schemars(range(min = 0.0, max = 2.0))]
         pub speed_mps: f64 = 1.1,
-        /// Stands until then, s.
+        /// Time until which the person stands, s.
         pub start_s: f64 = 0.0,
-        /// Rests at the points of the path for this long on every visit, s; none where
-        /// the list ends.
+        /// Rest at each point of the path on every visit, s; none beyond the end of the list.
         #[schemars(inner(range(min = 0.0, max = 3600.0)))]
         pub rest_s: Vec<f64>,
         /// Time before which the person is not in the room, s: a detector that learns the
         /// appearance of the empty room needs to see it.
         pub enters_s: f64 = 0.0,
-        /// End of the stay in the room, s; none if left out.
+        /// Time at which the person leaves the room, s; never if left out.
         pub leaves_s: Option<f64>,
         /// Behaviour at the end of the path.
         pub at_end: AtEnd = AtEnd::Stop,
         /// Behaviour when hidden.
         pub trick: Trick = Trick::None,
-        /// For how long the trick `stop` stays hidden, s.
+        /// Time for which the trick `stop` stays hidden, s.
         pub hide_s: f64 = 3.0,
-        /// The whole path is shifted by this, m.
+        /// Offset of the whole path, m.
         pub offset: [f64; 2] = [0.0; 2],
         /// Posture.
         pub posture: Posture = Posture::Upright,
-        /// Number of others that walk along, 0.6 to 1 m apart; they count as people of their own.
+        /// Number of others that walk along, 0.6 to 1 m apart; they count as separate people.
         #[schemars(range(max = 3))]
         pub companions: usize = 0,
-        /// Direction of the face at the start, degrees; the way ahead if left out.
+        /// Direction of the face at the start, degrees; the walking direction if left out.
         pub heading_deg: Option<f64>,
-        /// Turns on the spot, degrees per second.
+        /// Turn rate on the spot, degrees per second.
         pub spin_deg_per_s: f64 = 0.0,
-        /// Body height, m; by chance if left out.
+        /// Body height, m; random if left out.
         pub height_m: Option<f64>,
-        /// Number in the pool of people that the seed's split has, 0 to 499; by
-        /// chance if left out.
+        /// Index in the pool of people that the seed's split has, 0 to 499; random if left out.
         pub subject: Option<u64>,
-        /// In the clothes of this number of the pool; in their own if left out.
+        /// Index of the person of the pool whose clothes are worn; the own clothes if left out.
         pub look: Option<u64>,
-        /// Things put on or carried; by chance if left out.
+        /// Additional clothes and carried objects; random if left out.
         pub extras: Option<Vec<Extra>>,
-        /// Time at which the person takes off a coat, s: until then a coat in the colours of another
-        /// one's clothes is over the own ones. None without a coat to take off.
+        /// Time at which the person takes off a coat, s: until then a coat in the colours of
+        /// another person's clothes covers the own ones. No coat if left out.
         #[schemars(range(min = 0.0, max = 86400.0))]
         pub coat_off_s: Option<f64>,
     }

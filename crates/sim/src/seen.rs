@@ -1,4 +1,4 @@
-//! Intersection of a ray and a solid, split into the part that depends on the eye alone, computed
+//! Intersection of a ray and a solid, split into the part that depends only on the eye, computed
 //! once per image, and the part that depends on the ray, computed millions of times.
 
 use nalgebra::{Matrix3, Vector3};
@@ -8,18 +8,17 @@ use crate::lanes::{LANES, Lanes, Vectors, dot, product};
 /// A solid as it is seen from one point.
 #[derive(Clone, Copy, Debug)]
 pub struct SolidView {
-    /// From the world's axes to those in which the solid is simple: its own,
-    /// divided by the half axes where there are any.
+    /// Rotation from the world's axes to those in which the solid is simple: its own, divided by
+    /// the half axes if there are any.
     turn: Matrix3<f64>,
-    /// The eye in these.
+    /// Position of the eye in these axes.
     start: Vector3<f64>,
     solid: Solid,
 }
 
 #[derive(Clone, Copy, Debug)]
 enum Solid {
-    /// The ball of radius one; the eye's squared distance from its surface
-    /// along a tangent.
+    /// The ball of radius one; with the squared length of the tangent from the eye.
     Ball {
         tangent2: f64,
     },
@@ -40,26 +39,26 @@ struct Capsule {
     reach: f64,
     /// The mantle's constant term.
     mantle: f64,
-    /// Where the mantle begins and ends.
+    /// Start and end of the mantle.
     ends: [f64; 2],
-    /// As of [`Solid::Ball`], for the two balls.
+    /// As for [`Solid::Ball`], for the two balls.
     tangent2: [f64; 2],
 }
 
 impl SolidView {
-    /// An ellipsoid in its own axes, which `turn` leads to.
+    /// Creates the view of an ellipsoid in its own axes, to which `turn` leads.
     pub fn ellipsoid(turn: &Matrix3<f64>, eye: &Vector3<f64>, half: &Vector3<f64>) -> Self {
         let start = eye.component_div(half);
         let solid = Solid::Ball { tangent2: start.norm_squared() - 1.0 };
         Self { turn: divided(turn, half), start, solid }
     }
 
-    /// A block in its own axes.
+    /// Creates the view of a block in its own axes.
     pub fn block(turn: &Matrix3<f64>, eye: &Vector3<f64>, half: &Vector3<f64>) -> Self {
         Self { turn: divided(turn, half), start: eye.component_div(half), solid: Solid::Block }
     }
 
-    /// A capsule in its own axes.
+    /// Creates the view of a capsule in its own axes.
     pub fn capsule(
         turn: &Matrix3<f64>,
         eye: &Vector3<f64>,
@@ -83,7 +82,7 @@ impl SolidView {
         Self { turn: *turn, start: *eye, solid: Solid::Capsule(capsule) }
     }
 
-    /// Returns the smallest positive number of lengths of the ray after which it enters.
+    /// Returns the smallest positive distance, in ray lengths, at which the ray enters the solid.
     pub fn meet(&self, ray: &Vector3<f64>) -> Option<f64> {
         let t = match &self.solid {
             Solid::Ball { tangent2 } => self.meet_ball(*tangent2, ray),
@@ -93,8 +92,8 @@ impl SolidView {
         (t < f64::INFINITY).then_some(t)
     }
 
-    /// Shortens the way `t` of each ray that meets this solid, with the number `number`, before the
-    /// end of its way; nothing of it is closer to the eye than `nearest`.
+    /// Shortens the distance `t` of each ray that hits this solid, with index `number`, before its
+    /// present end. No part of the solid is closer to the eye than `nearest`.
     #[inline(always)]
     pub fn shorten(&self, rays: &Vectors, nearest: f64, number: u64, met: &mut Met) {
         match &self.solid {
@@ -119,7 +118,7 @@ impl SolidView {
         }
     }
 
-    /// Sets `barred` to one for each ray that meets this solid within `reach` lengths of it.
+    /// Sets `barred` to one for each ray that hits this solid within `reach` ray lengths.
     #[inline(always)]
     pub fn bar(&self, rays: &Vectors, reach: f64, barred: &mut [u64; LANES]) {
         match &self.solid {
@@ -145,7 +144,7 @@ impl SolidView {
     }
 
     // Without branches, so that loops over lanes become vector instructions; infinite for a ray
-    // that passes by.
+    // that misses.
 
     #[inline(always)]
     fn meet_ball(&self, tangent2: f64, ray: &Vector3<f64>) -> f64 {
@@ -163,22 +162,22 @@ impl SolidView {
     }
 }
 
-/// Range of each ray, and the number of the solid that it meets there.
+/// Distance of each ray, and the index of the solid that it hits there.
 #[derive(Clone, Copy, Debug)]
 pub struct Met {
-    /// Lengths of the ray; infinite where it meets nothing.
+    /// Distances in ray lengths; infinite if the ray hits nothing.
     pub t: Lanes,
-    /// Number of the solid; [`Met::NONE`] where the ray meets nothing.
+    /// Index of the solid; [`Met::NONE`] if the ray hits nothing.
     pub number: [u64; LANES],
 }
 
 impl Met {
-    /// Number of no solid.
+    /// Index that stands for no solid.
     pub const NONE: u64 = u64::MAX;
-    /// Rays that have met nothing yet.
+    /// Rays that have not hit anything yet.
     pub const NOTHING: Self = Self { t: [f64::INFINITY; LANES], number: [Self::NONE; LANES] };
 
-    /// Returns true if some ray goes farther than `nearest`.
+    /// Returns true if any ray goes farther than `nearest`.
     #[inline(always)]
     pub fn reaches(&self, nearest: f64) -> bool {
         let far: u64 = self.t.iter().fold(0, |far, t| far | u64::from(*t >= nearest));
@@ -197,7 +196,7 @@ fn divided(turn: &Matrix3<f64>, half: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::from_diagonal(&half.map(f64::recip)) * turn
 }
 
-/// Leaves out ways that lead back, and those to the surface on which the eye lies.
+/// Excludes distances behind the eye, and those to the surface on which the eye lies.
 #[inline(always)]
 fn ahead(t: f64) -> f64 {
     if t > 1e-6 { t } else { f64::INFINITY }
@@ -212,7 +211,7 @@ fn enter_ball(start: &Vector3<f64>, step: &Vector3<f64>, tangent2: f64) -> f64 {
     if root >= 0.0 { t } else { f64::INFINITY }
 }
 
-/// Slabs: Kay & Kajiya 1986.
+/// Intersects a ray with a block by the slab method (Kay & Kajiya 1986).
 #[inline(always)]
 fn enter_block(start: &Vector3<f64>, step: &Vector3<f64>) -> f64 {
     #[inline(always)]
@@ -247,7 +246,7 @@ impl Capsule {
         let near = enter_ball(start, step, self.tangent2[0]);
         let balls = near.min(enter_ball(&far, step, self.tangent2[1]));
         let t = if on_mantle { t } else { balls };
-        // The mantle goes on without end and has the balls inside of it.
+        // The mantle extends to infinity and contains the balls.
         if slanted & (root < 0.0) { f64::INFINITY } else { t }
     }
 }

@@ -1,5 +1,5 @@
-//! Sensors: from the surfaces that rays meet to camera images with exposure, blur and noise, and to
-//! the depth of a structured-light camera.
+//! Sensors: convert the surfaces that rays hit to camera images with exposure, blur and noise, and
+//! to the depth of a structured-light camera.
 
 use std::ops::Range;
 use std::sync::LazyLock;
@@ -12,11 +12,11 @@ use crate::material::luma;
 use crate::parallel::in_pieces;
 use crate::random::{normal_at, uniform_at};
 
-/// Mean brightness that the exposure aims at, 1 is white.
+/// Mean brightness at which the exposure aims; 1 is white.
 const TARGET: f64 = 0.28;
-/// Of so many pixels one is sampled for the mean brightness.
+/// One of this number of pixels is sampled for the mean brightness.
 const SAMPLED: usize = 7;
-/// Rows that a thread works on at once.
+/// Number of rows that a thread processes at once.
 const STRIP_ROWS: usize = 16;
 /// Loss of light in the corners.
 const VIGNETTING: f32 = 0.22;
@@ -26,18 +26,18 @@ const BASE_LIGHT: f64 = 60.0;
 /// at gain 1, where 1 is white.
 const READ_NOISE: f64 = 0.0025;
 const SHOT_NOISE: f64 = 0.012;
-/// Least infrared light that is matched: reflectance times cosine over m².
+/// Minimum infrared light that can be matched: reflectance times cosine over m².
 const LEAST_RETURN: f64 = 0.004;
 /// Steps per pixel of disparity (Khoshelham & Oude Elberink 2012).
 const STEPS_PER_PX: f64 = 8.0;
 /// Standard deviations of the noise of a disparity per step: 1 / 48 pixel at 8 steps per pixel.
 const SIGMAS_PER_STEP: f64 = 6.0;
-/// Columns, and rows, that share a part of the noise of the matcher.
+/// Number of columns, and of rows, that share a part of the matcher's noise.
 const PATCH: usize = 4;
-/// Standard deviation of the place that a depth is taken from, pixels (Handa et
-/// al. 2014).
+/// Standard deviation of the position from which a depth is taken, pixels (Handa et al. 2014).
 const EDGE_JITTER_PX: f64 = 0.5;
-/// No reading is displaced by more pixels: [`normal_at`] returns no number above twice the root of 3.
+/// Maximum displacement of a reading, pixels: [`normal_at`] returns no number above twice the root
+/// of 3.
 const REACH: usize = 2;
 
 /// The automatic exposure of a camera.
@@ -48,24 +48,25 @@ pub struct Exposure {
     threads: usize,
 }
 
-/// Moment of an image: all that changes it besides the view.
+/// Properties of one image other than the view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment {
-    /// Seed of the noise, another one for each image.
+    /// Seed of the noise, different for each image.
     pub seed: u64,
-    /// Columns that the view moves by while the shutter is open.
+    /// Columns by which the view moves during the exposure.
     pub smear_px: f64,
-    /// Sensitivity against that of the camera's partner.
+    /// Sensitivity relative to that of the other camera of a pair.
     pub gain: f64,
 }
 
 impl Exposure {
-    /// Of a camera that has not seen anything yet. `threads` develop an image.
+    /// Creates the exposure of a camera that has not seen anything yet. `threads` is the number of
+    /// threads that develop an image.
     pub fn new(threads: usize) -> Self {
         Self { mean_light: None, threads }
     }
 
-    /// A colour image.
+    /// Returns a colour image.
     pub fn colour(&mut self, seen: &HitImage, moment: &Moment) -> RgbImage {
         let factor = self.adapt(seen);
         let film = Film::new(seen, moment, factor);
@@ -74,7 +75,7 @@ impl Exposure {
         image
     }
 
-    /// A grey image.
+    /// Returns a grey image.
     pub fn grey(&mut self, seen: &HitImage, moment: &Moment) -> GreyImage {
         let factor = self.adapt(seen);
         let film = Film::new(seen, moment, factor);
@@ -83,12 +84,12 @@ impl Exposure {
         image
     }
 
-    /// Adapts to the light within some images; returns the factor on light.
+    /// Adapts to the light within a few images; returns the factor for the light.
     fn adapt(&mut self, seen: &HitImage) -> f64 {
         let width = seen.width();
         let mut sum = 0.0;
         for y in 0..seen.height() {
-            // Every seventh pixel is enough for a mean, and coprime to usual widths.
+            // Every seventh pixel is enough for a mean, and seven is coprime to usual widths.
             let first = (SAMPLED - y * width % SAMPLED) % SAMPLED;
             for x in (first..width).step_by(SAMPLED) {
                 let (group, lane) = seen.group(x, y);
@@ -97,7 +98,7 @@ impl Exposure {
         }
         let count = (width * seen.height()).div_ceil(SAMPLED);
         let now = (sum / count as f64).max(1e-3);
-        // Part of the way only, because an automatic exposure is slow.
+        // Only part of the way, because an automatic exposure is slow.
         let light = self.mean_light.map_or(now, |before| before + 0.2 * (now - before));
         self.mean_light = Some(light);
         TARGET / light
@@ -108,7 +109,7 @@ impl Exposure {
 struct Film<'a> {
     seen: &'a HitImage,
     moment: &'a Moment,
-    /// Factor on light, so that 1 is white.
+    /// Factor for the light, so that 1 is white.
     factor: f64,
     /// Variance of the read noise, and that of the shot noise of a white pixel.
     noise: [f64; 2],
@@ -122,8 +123,9 @@ impl<'a> Film<'a> {
         Self { seen, moment, factor, noise }
     }
 
-    /// All channels: lens blur, motion blur, vignetting, noise, gamma. `light` writes the light of a
-    /// row and channel times a factor, `print` a row of pixels from the levels of its channels.
+    /// Computes all channels: lens blur, motion blur, vignetting, noise, gamma. `light` writes the
+    /// light of a row and channel times a factor, `print` a row of pixels from the levels of its
+    /// channels.
     fn expose<const CHANNELS: usize, P: Send>(
         &self,
         threads: usize,
@@ -147,7 +149,7 @@ impl<'a> Film<'a> {
         });
     }
 
-    /// The channels of some rows and of those above and below, blurred along the rows.
+    /// Returns the channels of some rows and of those above and below, blurred along the rows.
     fn blurred_across<const CHANNELS: usize>(
         &self,
         rows: &Range<usize>,
@@ -169,8 +171,8 @@ impl<'a> Film<'a> {
         across
     }
 
-    /// The other half of the blur of a lens; the border stays. `top` is the row after the first one
-    /// in `across`, which is missing at the upper border.
+    /// Applies the other half of the lens blur; the border is unchanged. `top` is the row after the
+    /// first one in `across`, which is missing at the upper border.
     fn blur_along(&self, row: usize, top: usize, across: &[f32], soft: &mut [f32]) {
         let width = soft.len();
         let at = (row - top.saturating_sub(1)) * width;
@@ -190,7 +192,7 @@ impl<'a> Film<'a> {
     }
 }
 
-/// Brightness of a row in 12 bits: vignetting and noise.
+/// Computes the brightness of a row in 12 bits, with vignetting and noise.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn develop(film: &Film<'_>, soft: &[f32], row: usize, seed: u64, levels: &mut [u16]) {
     let width = film.seen.width();
@@ -200,11 +202,12 @@ fn develop(film: &Film<'_>, soft: &[f32], row: usize, seed: u64, levels: &mut [u
     let dy = row as f32 - cy;
     let (gain, [read, shot]) = (film.moment.gain, film.noise);
     let first = (row * width) as u64;
-    // A counter of 32 bits, because wider ones are no vector instruction to convert.
+    // A counter of 32 bits, because wider ones cannot be converted with vector instructions.
     let mut x = 0_i32;
     for (light, level) in soft.iter().zip(levels) {
         let dx = x as f32 - cx;
-        // Light falls with the square of the distance from the centre, near enough to cos^4.
+        // Light falls off with the square of the distance from the centre, a good approximation of
+        // cos^4.
         let corner = VIGNETTING * (dx * dx + dy * dy) / (cx * cx + cy * cy);
         let dimmed = f64::from(light * (1.0 - corner)) * gain;
         let sigma = (read + shot * dimmed).sqrt();
@@ -214,7 +217,7 @@ fn develop(film: &Film<'_>, soft: &[f32], row: usize, seed: u64, levels: &mut [u
     }
 }
 
-/// 12-bit linear light to 8 bit.
+/// Curve from 12-bit linear light to 8 bits.
 static CURVE: LazyLock<[u8; 4096]> = LazyLock::new(|| {
     std::array::from_fn(|i| (255.0 * (i as f64 / 4095.0).powf(1.0 / 2.2)).round() as u8)
 });
@@ -230,7 +233,7 @@ fn channel_light(row: &[HitGroup], channel: usize, factor: f64, to: &mut [f32]) 
     }
 }
 
-/// As [`channel_light`], of the brightness of all colours together.
+/// Does the same as [`channel_light`] for the brightness of all colours together.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn grey_light(row: &[HitGroup], _: usize, factor: f64, to: &mut [f32]) {
     for (group, to) in row.iter().zip(to.chunks_exact_mut(LANES)) {
@@ -257,7 +260,7 @@ fn grey_row([grey]: &[Vec<u16>; 1], to: &mut [u8]) {
     }
 }
 
-/// The blur of a camera that turns: a running mean along a row.
+/// Applies the blur of a turning camera: a running mean along a row.
 fn smear(row: &[f32], by_px: f64, to: &mut [f32]) {
     let reach = (0.5 * by_px.abs()).round() as usize;
     if reach == 0 {
@@ -269,14 +272,14 @@ fn smear(row: &[f32], by_px: f64, to: &mut [f32]) {
         let part = &row[x.saturating_sub(reach)..(x + reach + 1).min(row.len())];
         to[x] = part.iter().sum::<f32>() / part.len() as f32;
     }
-    // A narrow image has no column that is far enough from both borders.
+    // A narrow image has no column far enough from both borders.
     if !inner.is_empty() {
         running_mean(row, 2 * reach + 1, &mut to[inner]);
     }
 }
 
-/// Means of so many numbers in a row, from each number on for which there are enough. Each is added
-/// up from its first number to its last, as a loop over one of them would do.
+/// Computes the means of `of` consecutive numbers, from each number for which there are enough.
+/// Each sum runs from its first number to its last, as in a loop over one of them.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn running_mean(row: &[f32], of: usize, to: &mut [f32]) {
     to.copy_from_slice(&row[..to.len()]);
@@ -291,7 +294,7 @@ fn running_mean(row: &[f32], of: usize, to: &mut [f32]) {
     }
 }
 
-/// One half of the blur of a lens: weights 1 2 1 along a row; the border stays.
+/// Applies one half of the lens blur: weights 1 2 1 along a row; the border is unchanged.
 fn soften_across(row: &[f32], to: &mut Vec<f32>) {
     let from = to.len();
     to.extend_from_slice(row);
@@ -299,7 +302,7 @@ fn soften_across(row: &[f32], to: &mut Vec<f32>) {
     weigh(row, &row[1..], &row[2..], &mut inner[..row.len() - 2]);
 }
 
-/// Mean of three rows with the weights 1 2 1.
+/// Computes the mean of three rows with the weights 1 2 1.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn weigh(before: &[f32], here: &[f32], after: &[f32], to: &mut [f32]) {
     for (((to, before), here), after) in to.iter_mut().zip(before).zip(here).zip(after) {
@@ -312,15 +315,15 @@ fn weigh(before: &[f32], here: &[f32], after: &[f32], to: &mut [f32]) {
 pub struct DepthSensor {
     /// Focal length, pixels.
     pub focal_px: f64,
-    /// Distance of camera and projector, m.
+    /// Distance between camera and projector, m.
     pub baseline_m: f64,
-    /// Nearest and farthest depth, m.
+    /// Minimum and maximum depth, m.
     pub range_m: [f64; 2],
 }
 
 impl DepthSensor {
-    /// The depth image; NaN where there is no reading: out of range, too little
-    /// light returned, or in the shadow of the projector, which stands to the right.
+    /// Returns the depth image, with NaN where there is no reading: out of range, too little light
+    /// returned, or in the shadow of the projector, which is to the right.
     pub fn measure(&self, seen: &HitImage, seed: u64, threads: usize) -> DepthImage {
         let mut depth = DepthImage::filled(seen.width(), seen.height(), f32::NAN);
         let width = seen.width();
@@ -339,13 +342,13 @@ impl DepthSensor {
     }
 }
 
-/// Surfaces of some rows of an image and of those around them, number by number.
+/// Surfaces in some rows of an image and in those around them, value by value.
 struct NearSurfaces {
-    /// Rows of the image.
+    /// Number of rows of the image.
     height: usize,
-    /// The first row that is here.
+    /// The first row that is stored.
     top: usize,
-    /// Numbers of a row.
+    /// Number of values per row.
     stride: usize,
     t: Vec<f64>,
     infrared: Vec<f64>,
@@ -375,15 +378,16 @@ impl NearSurfaces {
     }
 }
 
-/// One row of a depth image in work.
+/// One row of a depth image while it is computed.
 struct DepthRow {
-    /// Columns and rows that each pixel is displaced by.
+    /// Columns and rows by which each pixel is displaced.
     off: [Vec<i32>; 2],
-    /// Of the surfaces seen: depth, reflectance in the near infrared, cosine to the normal.
+    /// Properties of the visible surfaces: depth, reflectance in the near infrared, cosine to the
+    /// normal.
     t: Vec<f64>,
     infrared: Vec<f64>,
     facing: Vec<f64>,
-    /// Noise of the matcher in patches of [`PATCH`] pixels, and the same for each pixel.
+    /// Noise of the matcher in patches of [`PATCH`] pixels, and for each pixel.
     patches: Vec<f64>,
     coarse: Vec<f64>,
     depth_m: Vec<f32>,
@@ -402,7 +406,7 @@ impl DepthRow {
         }
     }
 
-    /// Takes the surfaces near each pixel: measured edges are displaced.
+    /// Takes the surface at a position near each pixel, because measured edges are displaced.
     fn look(&mut self, near: &NearSurfaces, seed: u64, y: usize) {
         let width = self.t.len();
         let first = (y * width) as u64;
@@ -430,8 +434,8 @@ impl DepthRow {
     /// Removes the readings in the shadow of the projector.
     fn cast_shadows(&mut self, sensor: &DepthSensor) {
         let steps = sensor.focal_px * sensor.baseline_m;
-        // From right to left, because the projector stands to the right of the camera: near
-        // surfaces shadow the pixels to their left.
+        // From right to left, because the projector is to the right of the camera: near surfaces
+        // shadow the pixels to their left.
         let mut leftmost = f64::INFINITY;
         for (x, (t, depth_m)) in self.t.iter().zip(&mut self.depth_m).enumerate().rev() {
             let lit_from = x as f64 - steps / t;
@@ -443,7 +447,7 @@ impl DepthRow {
     }
 }
 
-/// Whole pixels that the places of readings are off by.
+/// Returns the integer offsets of the positions of readings, pixels.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn jitter(seed: u64, first: u64, off: &mut [i32]) {
     let mut key = first;
@@ -453,7 +457,7 @@ fn jitter(seed: u64, first: u64, off: &mut [i32]) {
     }
 }
 
-/// Depths without the shadow of the projector; NaN where too little light returns.
+/// Computes depths without the shadow of the projector; NaN if too little light returns.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn measure(row: &mut DepthRow, sensor: &DepthSensor, seed: u64, y: u64) {
     let width = row.depth_m.len();
@@ -478,7 +482,7 @@ fn measure(row: &mut DepthRow, sensor: &DepthSensor, seed: u64, y: u64) {
         let x64 = x as u64;
         let facing = if facing[x] > 0.0 { facing[x] } else { 0.0 };
         let light = infrared[x] * facing / (t * t);
-        // The matcher decides for patches of 9 x 9 dots: holes have a size.
+        // The matcher decides for patches of 9 x 9 dots, so holes have a minimum size.
         let coarse = coarse[x];
         let fine = 0.75 + 0.5 * uniform_at(seed ^ 0x52, y << 20 | x64);
         let returns = (t >= nearest) & (t <= farthest) & (light > LEAST_RETURN * coarse * fine);

@@ -1,7 +1,7 @@
-//! Shadows: for each direction from a lamp, the few solids that may stand there. What stands still is
+//! Shadows: for each direction from a lamp, the few solids that may be there. Solids at rest are
 //! sorted into cells of directions (the light buffer of Haines & Greenberg 1986, on the faces of a
-//! cube); what moves has balls around solids that belong together, which take less time to make than
-//! cells for every image.
+//! cube); moving solids have bounding balls around groups, which take less time to build than cells
+//! for every image.
 
 use std::ops::Range;
 
@@ -12,15 +12,15 @@ use crate::seen::SolidView;
 use crate::shape::Shape;
 use crate::sight::{before, between};
 
-/// Cells along the side of a face of the cube.
+/// Number of cells along the side of a face of the cube.
 pub const SIDE: usize = 32;
-/// A bundle of ways through more cells is held against each solid instead.
+/// A bundle of rays through more cells is tested against each solid instead.
 const MOST_CELLS: usize = 64;
-/// Room for rounding, m, and on a face, whose half side is 1.
+/// Margin for rounding, m, and on a face, whose half side is 1.
 const SLACK_M: f64 = 1e-4;
 const SLACK: f64 = 1e-6;
 
-/// Middle of a ball as seen from the lamp, and its radius, m.
+/// Centre of a ball as seen from the lamp, and its radius, m.
 type Ball = (Vector3<f64>, f64);
 
 /// Objects around a lamp that cast shadows.
@@ -28,34 +28,34 @@ type Ball = (Vector3<f64>, f64);
 pub struct Shadows {
     lamp: Point3<f64>,
     shapes: Vec<Shape>,
-    /// As the lamp sees them.
+    /// The objects as the lamp sees them.
     solids: Vec<SolidView>,
-    /// Balls around them.
+    /// Bounding balls of the solids.
     balls: Vec<Ball>,
     index: Index,
 }
 
-/// Finds the solids that may stand in a bundle of ways.
+/// Index of the solids that may intersect a bundle of rays.
 #[derive(Clone, Debug)]
 enum Index {
     Cells(Cells),
-    /// Balls around solids that belong together, and the numbers of these.
+    /// Bounding balls of groups of solids, and the indices of these.
     Groups(Vec<(Ball, Range<u32>)>),
 }
 
-/// Solids by the directions in which they stand.
+/// Solids by their directions.
 #[derive(Clone, Debug)]
 struct Cells {
     /// Cells along the side of a face.
     side: usize,
-    /// Numbers of solids, cell by cell.
+    /// Indices of solids, cell by cell.
     numbers: Vec<u32>,
-    /// Six faces of rows of cells: where the numbers of each cell end.
+    /// End of the indices of each cell, for six faces of rows of cells.
     ends: Vec<u32>,
 }
 
 impl Shadows {
-    /// The shadows that solids throw which stand still, in faces of `side` by `side` cells.
+    /// Creates the shadows of solids at rest, with faces of `side` by `side` cells.
     pub fn still<'a>(
         side: usize,
         lamp: Point3<f64>,
@@ -67,7 +67,7 @@ impl Shadows {
         shadows
     }
 
-    /// The shadows that objects throw which move, solid by solid of each.
+    /// Creates the shadows of moving objects, given by the solids of each.
     pub fn moving<'a, S: Iterator<Item = &'a Shape>>(
         lamp: Point3<f64>,
         objects: impl Iterator<Item = S>,
@@ -99,7 +99,7 @@ impl Shadows {
         }
     }
 
-    /// True if something stands in the way from the lamp to a point.
+    /// Returns true if a solid blocks the ray from the lamp to a point.
     pub fn on(&self, way: &Vector3<f64>) -> bool {
         match &self.index {
             Index::Cells(cells) => cells.on_way(way).iter().any(|number| self.is_in(*number, way)),
@@ -111,12 +111,12 @@ impl Shadows {
         }
     }
 
-    /// True if a solid stands in the way from the lamp to a point.
+    /// Returns true if this solid blocks the ray from the lamp to a point.
     fn is_in(&self, number: u32, way: &Vector3<f64>) -> bool {
         self.solids[number as usize].meet(way).is_some_and(|t| t < 1.0)
     }
 
-    /// Writes the numbers of all solids that may stand in some way of a bundle, and perhaps of some
+    /// Writes the indices of all solids that may block a ray of a bundle, and perhaps of some
     /// others, to `found`.
     pub fn find(&self, bundle: &Bundle, found: &mut Vec<u32>) {
         found.clear();
@@ -133,7 +133,8 @@ impl Shadows {
             }
         }
         found.retain(|number| bundle.reaches(&self.balls[*number as usize]));
-        // The shape of a solid is dear to look at, but less so than all that its ball lets through.
+        // The test of a solid's shape is expensive, but less so than all that its ball would let
+        // through.
         if !found.is_empty()
             && let Some(sides) = bundle.sides()
         {
@@ -141,8 +142,8 @@ impl Shadows {
         }
     }
 
-    /// Returns the ways of interest, as bits, in which some of the numbered solids stand; they are
-    /// those of [`Shadows::find`] for a bundle of these ways.
+    /// Returns the rays of interest, as bits, that some of these solids block; the solids are those
+    /// of [`Shadows::find`] for a bundle of these rays.
     pub fn bar(&self, numbers: &[u32], ways: &Vectors, interest: u32) -> u32 {
         if numbers.is_empty() || interest == 0 {
             return 0;
@@ -185,8 +186,8 @@ impl Cells {
         cells
     }
 
-    /// Writes the numbers of the solids in the cells of a bundle; returns false for one through
-    /// several faces or many cells.
+    /// Writes the indices of the solids in the cells of a bundle; returns false if it passes
+    /// through several faces or many cells.
     fn find(&self, bundle: &Bundle, found: &mut Vec<u32>) -> bool {
         let Some((face, [left, right], [top, bottom])) = self.through(bundle) else { return false };
         for row in top..=bottom {
@@ -200,8 +201,8 @@ impl Cells {
         true
     }
 
-    /// Returns the face that a bundle goes through, the columns and the rows of cells there, from the
-    /// first to the last; `None` for one through several faces or many cells.
+    /// Returns the face through which a bundle passes, and the ranges of columns and rows of cells
+    /// there; `None` if it passes through several faces or many cells.
     fn through(&self, bundle: &Bundle) -> Option<(usize, [usize; 2], [usize; 2])> {
         let main = bundle.main_axis()?;
         let columns = bundle.cells_along((main + 1) % 3, main, self.side);
@@ -211,19 +212,19 @@ impl Cells {
         (count <= MOST_CELLS).then_some((face, columns, rows))
     }
 
-    /// The numbers of the solids in the cell that a way goes through.
+    /// Returns the indices of the solids in the cell through which a ray passes.
     fn on_way(&self, way: &Vector3<f64>) -> &[u32] {
         self.within(cell(way, self.side) as usize)
     }
 
-    /// The numbers of the solids in a cell.
+    /// Returns the indices of the solids in a cell.
     fn within(&self, cell: usize) -> &[u32] {
         let start = cell.checked_sub(1).map_or(0, |before| self.ends[before]);
         &self.numbers[start as usize..self.ends[cell] as usize]
     }
 }
 
-/// Returns a ball around some others, of which there is at least one.
+/// Returns a bounding ball of some others, of which there is at least one.
 fn around(balls: &[Ball]) -> Ball {
     let mut low = Vector3::repeat(f64::INFINITY);
     let mut high = -low;
@@ -236,32 +237,34 @@ fn around(balls: &[Ball]) -> Ball {
     (middle, reaches.fold(0.0, f64::max))
 }
 
-/// Ways from a lamp whose ends lie in a box.
+/// Rays from a lamp whose ends are in a box.
 #[derive(Clone, Copy, Debug)]
 pub struct Bundle {
     low: Vector3<f64>,
     high: Vector3<f64>,
-    /// The way to the middle of the box, and one over its length.
+    /// The ray to the middle of the box, and one over its length.
     middle: Vector3<f64>,
     per_length: f64,
-    /// No way ends farther from the middle one, m; on its way there it is nearer in proportion.
+    /// Maximum distance of the end of a ray from that of the middle one, m; nearer to the lamp the
+    /// rays are closer in proportion.
     radius: f64,
-    /// One over how much longer the middle way is than that, if the lamp is outside of the box.
+    /// One over the difference between the length of the middle ray and that distance, if the lamp
+    /// is outside of the box.
     per_rest: Option<f64>,
 }
 
 impl Bundle {
-    /// Creates the bundle of all ways to a box, given by two of its corners as seen from the lamp.
+    /// Creates the bundle of all rays to a box, given by two of its corners as seen from the lamp.
     pub fn new(low: Vector3<f64>, high: Vector3<f64>) -> Self {
         let middle = 0.5 * (low + high);
-        // A lamp in the box has a middle way without length.
+        // If the lamp is in the box, the middle ray may have no length.
         let length = middle.norm().max(SLACK_M);
         let radius = 0.5 * (high - low).norm() + SLACK_M;
         let per_rest = (length > radius + SLACK_M).then(|| (length - radius).recip());
         Self { low, high, middle, per_length: length.recip(), radius, per_rest }
     }
 
-    /// Returns the axis whose face of the cube all ways go through; `None` if there are several.
+    /// Returns the axis of the cube face through which all rays pass; `None` if there are several.
     fn main_axis(&self) -> Option<usize> {
         (0..3).find(|axis| {
             let others = self.far_m((axis + 1) % 3).max(self.far_m((axis + 2) % 3));
@@ -269,16 +272,17 @@ impl Bundle {
         })
     }
 
-    /// Returns the first and the last of the cells that the ways go through, along an axis of the face
-    /// of a main axis.
+    /// Returns the first and the last of the cells through which the rays pass, along an axis of
+    /// the face of a main axis.
     fn cells_along(&self, axis: usize, main: usize, side: usize) -> [usize; 2] {
         let half = 0.5 * side as f64;
         self.slopes(axis, main).map(|at| ((at * half + half).max(0.0) as usize).min(side - 1))
     }
 
-    /// Returns the least and the largest slope of the ways along an axis, per length along the main one.
+    /// Returns the minimum and the maximum slope of the rays along an axis, per length along the
+    /// main one.
     fn slopes(&self, axis: usize, main: usize) -> [f64; 2] {
-        // What is nearer along the main axis lies farther out on the face.
+        // Points that are nearer along the main axis are farther out on the face.
         let near_m = self.near_m(main);
         let far_m = self.far_m(main);
         let from = self.low[axis] / if self.low[axis] < 0.0 { near_m } else { far_m };
@@ -286,8 +290,8 @@ impl Bundle {
         [from - SLACK, to + SLACK]
     }
 
-    /// Returns the inward normals of four planes through the lamp between which all ways are; `None` if
-    /// they go through several faces of the cube.
+    /// Returns the inward normals of four planes through the lamp between which all rays are;
+    /// `None` if they pass through several faces of the cube.
     fn sides(&self) -> Option<[Vector3<f64>; 4]> {
         let main = self.main_axis()?;
         let sign = if self.high[main] < 0.0 { -1.0 } else { 1.0 };
@@ -309,17 +313,17 @@ impl Bundle {
         self.low[axis].abs().max(self.high[axis].abs())
     }
 
-    /// Returns the least distance of an end from the lamp along an axis, m; not positive if there are
-    /// ends on both sides.
+    /// Returns the minimum distance of an end from the lamp along an axis, m; not positive if there
+    /// are ends on both sides.
     fn near_m(&self, axis: usize) -> f64 {
         self.low[axis].max(-self.high[axis])
     }
 
-    /// Returns false if a ball is beside all ways.
+    /// Returns false if a ball is beside all rays.
     #[inline(always)]
     fn reaches(&self, (centre, radius): &Ball) -> bool {
         let along = dot(centre, &self.middle) * self.per_length;
-        // Ways spread from the lamp on: this is the last part of them that may touch the ball.
+        // Rays spread from the lamp: this is the farthest part of them that may touch the ball.
         let last =
             self.per_rest.map_or(1.0, |per_rest| ((along + radius) * per_rest).clamp(0.0, 1.0));
         let part = (along * self.per_length).clamp(0.0, last);
@@ -329,11 +333,11 @@ impl Bundle {
     }
 }
 
-/// Returns the lowest and highest coordinates of some vectors, those of lanes whose bits are set; at
-/// least one must be.
+/// Returns the lowest and the highest coordinates of some vectors, those in lanes whose bits are
+/// set; at least one must be.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 pub fn bounds(of: &Vectors, wanted: u32) -> (Vector3<f64>, Vector3<f64>) {
-    // Lanes that do not count repeat one that does.
+    // Lanes that do not count get the value of one that does.
     let one = of.at(wanted.trailing_zeros() as usize % LANES);
     let (low_x, high_x) = range(&of.x, wanted, one.x);
     let (low_y, high_y) = range(&of.y, wanted, one.y);
@@ -341,8 +345,8 @@ pub fn bounds(of: &Vectors, wanted: u32) -> (Vector3<f64>, Vector3<f64>) {
     (Vector3::new(low_x, low_y, low_z), Vector3::new(high_x, high_y, high_z))
 }
 
-/// Returns the least and the largest of some numbers. Halves are compared side by side, since a loop
-/// over all is no vector instruction.
+/// Returns the minimum and the maximum of some numbers. Halves are compared in parallel, because a
+/// loop over all numbers would not become vector instructions.
 #[inline(always)]
 fn range(of: &Lanes, wanted: u32, one: f64) -> (f64, f64) {
     const HALF: usize = LANES / 2;
@@ -385,8 +389,8 @@ pub fn bits(of: &[bool; LANES]) -> u32 {
     bits
 }
 
-/// Returns the ways in which some of the numbered solids stand, until none of those of interest,
-/// which a bundle holds, is left; both as bits.
+/// Returns the rays that some of these solids block, until none of those of interest, which are in
+/// a bundle, is left; both as bits.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn barred(
     shadows: &Shadows,
@@ -395,11 +399,12 @@ fn barred(
     ways: &Vectors,
     interest: u32,
 ) -> u32 {
-    // As wide as the rays' numbers, because vector instructions convert slowly between widths.
+    // As wide as the indices of the rays, because vector instructions convert slowly between
+    // widths.
     let interest: [u64; LANES] = std::array::from_fn(|lane| u64::from(interest >> lane & 1));
     let mut barred = [0; LANES];
     for number in numbers {
-        // The ball around a solid is a cheap question to ask first.
+        // The test of the bounding ball is cheap, so it comes first.
         if !bundle.reaches(&shadows.balls[*number as usize]) {
             continue;
         }
@@ -415,13 +420,13 @@ fn barred(
     bits(&barred.map(|barred| barred != 0))
 }
 
-/// Where a line between cells runs on a face, -1 to 1.
+/// Returns the position of a line between cells on a face, -1 to 1.
 fn line(number: usize, side: usize) -> f64 {
     2.0 * number as f64 / side as f64 - 1.0
 }
 
-/// A point of a face of the cube of half side one. Even faces are those of
-/// positive coordinates.
+/// Returns a point on a face of the cube of half side one. Even faces are those of positive
+/// coordinates.
 fn on_face(face: usize, u: f64, v: f64) -> Vector3<f64> {
     let axis = face / 2;
     let mut point = Vector3::zeros();
@@ -431,17 +436,17 @@ fn on_face(face: usize, u: f64, v: f64) -> Vector3<f64> {
     point
 }
 
-/// The ends of a line of a face between two rows of cells.
+/// Returns the ends of the line between two rows of cells of a face.
 fn row_ends(face: usize, v: f64) -> [Vector3<f64>; 2] {
     [on_face(face, -1.0, v), on_face(face, 1.0, v)]
 }
 
-/// The ends of a line of a face between two columns of cells.
+/// Returns the ends of the line between two columns of cells of a face.
 fn column_ends(face: usize, u: f64) -> [Vector3<f64>; 2] {
     [on_face(face, u, -1.0), on_face(face, u, 1.0)]
 }
 
-/// The cell that a way goes through.
+/// Returns the cell through which a ray passes.
 fn cell(way: &Vector3<f64>, side: usize) -> i32 {
     let x = way.x.abs();
     let y = way.y.abs();
@@ -456,7 +461,7 @@ fn cell(way: &Vector3<f64>, side: usize) -> i32 {
     let axis = if on_x { 0 } else { 2 - i32::from(on_y) };
     let (side, half) = (side as i32, 0.5 * side as f64);
     let scale = half / main.abs();
-    // A way without length falls into some cell, and nothing is in it.
+    // A ray without length falls into some cell, which contains nothing for it.
     let along = |of: f64| ((of * scale + half) as i32).max(0).min(side.wrapping_sub(1));
     let face = axis.wrapping_mul(2).wrapping_add(i32::from(main < 0.0));
     face.wrapping_mul(side).wrapping_add(along(v)).wrapping_mul(side).wrapping_add(along(u))

@@ -1,4 +1,4 @@
-//! The solids of which everything is made, and how a ray meets them.
+//! The solids of which all objects consist, and their intersection with rays.
 
 use nalgebra::{Matrix3, Point3, Rotation3, Unit, Vector3};
 
@@ -6,9 +6,9 @@ use crate::lanes::{LANES, Lanes, Vectors, dot, product, transposed_product};
 use crate::material::Material;
 use crate::seen::SolidView;
 
-/// Room for rounding, m.
+/// Margin for rounding, m.
 const SLACK_M: f64 = 1e-6;
-/// Half a side from which on a flat side is large, m.
+/// Half side from which on a flat side is large, m.
 const SLAB_M: f64 = 0.3;
 
 /// The geometry of a solid in its own axes, origin at its centre.
@@ -33,20 +33,20 @@ pub enum Form {
 /// A solid in the world.
 #[derive(Clone, Copy, Debug)]
 pub struct Shape {
-    /// Its geometry.
+    /// Geometry.
     pub form: Form,
-    /// Its origin in the world, m.
+    /// Origin in the world, m.
     pub origin: Point3<f64>,
-    /// From its own axes to those of the world.
+    /// Rotation from its own axes to those of the world.
     pub world_from_own: Rotation3<f64>,
     /// Material of the solid.
     pub material: Material,
-    /// Centre and squared radius of a ball around it.
+    /// Centre and squared radius of the bounding ball.
     ball: (Point3<f64>, f64),
 }
 
 impl Shape {
-    /// A solid.
+    /// Creates a solid.
     pub fn new(
         form: Form,
         origin: Point3<f64>,
@@ -59,13 +59,14 @@ impl Shape {
         shape
     }
 
-    /// Returns the solid higher by so much, m.
+    /// Returns the solid raised by `by_m`, m.
     pub fn raised(&self, by_m: f64) -> Self {
         let origin = self.origin + Vector3::new(0.0, 0.0, by_m);
         Self::new(self.form, origin, self.world_from_own, self.material)
     }
 
-    /// A capsule between two points; `forward` fixes how a texture lies on it.
+    /// Creates a capsule between two points; `forward` determines the orientation of a texture on
+    /// it.
     pub fn limb(
         ends: (Point3<f64>, Point3<f64>),
         radii: (f64, f64),
@@ -73,7 +74,7 @@ impl Shape {
         material: Material,
     ) -> Self {
         let axis = ends.1 - ends.0;
-        // A ball that swallows the other is drawn as itself.
+        // A ball that contains the other is rendered alone.
         let length = axis.norm().max((radii.0 - radii.1).abs() * 1.01).max(1e-6);
         let up = Unit::try_new(axis, 1e-9).unwrap_or_else(Vector3::z_axis);
         // Any forward direction is right for a limb along it.
@@ -86,7 +87,7 @@ impl Shape {
         Self::new(form, ends.0, turn, material)
     }
 
-    /// Centre and radius of a ball around the solid.
+    /// Returns centre and radius of the bounding ball.
     pub fn bound(&self) -> (Point3<f64>, f64) {
         match self.form {
             Form::Ellipsoid(half) => (self.origin, half.max()),
@@ -99,7 +100,7 @@ impl Shape {
         }
     }
 
-    /// Returns its middle, and of a block the middles of its sides too, in the world, m.
+    /// Returns the centre, and for a block also the middles of its sides, in the world, m.
     pub fn spots(&self) -> Vec<Point3<f64>> {
         let Form::Block(half) = self.form else { return vec![self.bound().0] };
         let sides = (0..3).flat_map(|axis| [-1.0, 1.0].map(|sign| (axis, sign)));
@@ -111,32 +112,32 @@ impl Shape {
         std::iter::once(self.origin).chain(sides.map(middle)).collect()
     }
 
-    /// False if a ray passes by the ball around the solid: the cheap question
-    /// to ask first. `per_length` is one over the squared length of the ray.
+    /// Returns false if a ray misses the bounding ball, which is a cheap first test. `per_length`
+    /// is one over the squared length of the ray.
     pub fn near(&self, eye: &Point3<f64>, ray: &Vector3<f64>, per_length: f64) -> bool {
         let way = self.ball.0 - eye;
         let along = way.dot(ray);
         way.norm_squared() - along * along * per_length <= self.ball.1
     }
 
-    /// True if the ball around the solid is on one side of the plane through an eye with this unit
+    /// Returns true if the bounding ball is on one side of the plane through an eye with this unit
     /// normal.
     pub fn is_beside(&self, eye: &Point3<f64>, normal: &Vector3<f64>) -> bool {
         let away = normal.dot(&(self.ball.0 - eye));
         away * away > self.ball.1
     }
 
-    /// True if the ball around the solid is behind the plane through an eye with this unit normal.
+    /// Returns true if the bounding ball is behind the plane through an eye with this unit normal.
     pub fn is_behind(&self, eye: &Point3<f64>, normal: &Vector3<f64>) -> bool {
         let ahead = normal.dot(&(self.ball.0 - eye));
         ahead < 0.0 && ahead * ahead > self.ball.1
     }
 
-    /// Returns true if parts of it are on the sides of some planes through an eye that unit vectors point
-    /// to.
+    /// Returns true if parts of the solid are on the inner sides of some planes through an eye, to
+    /// which the unit vectors point.
     pub fn reaches(&self, eye: &Point3<f64>, normals: &[Vector3<f64>]) -> bool {
         let way = self.origin - eye;
-        // The ball around a solid is a cheap question to ask first.
+        // The test of the bounding ball is cheap, so it comes first.
         normals.iter().all(|normal| {
             !self.is_behind(eye, normal) && normal.dot(&way) + self.extent(normal) > -SLACK_M
         })
@@ -160,7 +161,7 @@ impl Shape {
         large >= 2
     }
 
-    /// A point of the world in the solid's own axes.
+    /// Converts a point of the world to the solid's own axes.
     pub fn own(&self, point: &Point3<f64>) -> Vector3<f64> {
         self.world_from_own.inverse_transform_vector(&(point - self.origin))
     }
@@ -184,7 +185,7 @@ impl Shape {
         }
     }
 
-    /// The outward normal in the world at a point of the surface in own axes.
+    /// Returns the outward normal in the world at a point of the surface in own axes.
     pub fn normal(&self, own: &Vector3<f64>) -> Vector3<f64> {
         let normal = match self.form {
             Form::Ellipsoid(half) => ellipsoid_normal(own, &half),
@@ -196,7 +197,7 @@ impl Shape {
         self.world_from_own * normal
     }
 
-    /// Returns the surface at points of it, which rays meet.
+    /// Returns the surface at the points at which rays hit it.
     pub fn surface(&self, points: &Vectors, rays: &Vectors) -> Surface {
         surface(self, points, rays)
     }
@@ -209,7 +210,7 @@ pub struct Surface {
     pub own: Vectors,
     /// Outward normals in the world.
     pub normal: Vectors,
-    /// Cosines between the normals and the ways back.
+    /// Cosines between the normals and the rays back.
     pub facing: Lanes,
 }
 
@@ -256,7 +257,7 @@ fn ellipsoid_normal(own: &Vector3<f64>, half: &Vector3<f64>) -> Vector3<f64> {
     ))
 }
 
-/// The normal of a capsule whose mantle slopes with this sine.
+/// Returns the normal of a capsule whose mantle slopes with this sine.
 #[inline(always)]
 fn capsule_normal(own: &Vector3<f64>, length: f64, sine: f64) -> Vector3<f64> {
     let cosine = (1.0 - sine * sine).sqrt();
@@ -270,7 +271,7 @@ fn capsule_normal(own: &Vector3<f64>, length: f64, sine: f64) -> Vector3<f64> {
 #[inline(always)]
 fn unit(vector: &Vector3<f64>) -> Vector3<f64> {
     let length = dot(vector, vector).sqrt();
-    // At the centre there is no normal; any direction is as good.
+    // The centre has no normal; any direction will do.
     let known = length > 1e-12;
     Vector3::new(
         if known { vector.x / length } else { 0.0 },
@@ -279,7 +280,7 @@ fn unit(vector: &Vector3<f64>) -> Vector3<f64> {
     )
 }
 
-/// The normal of the side that a point lies on.
+/// Returns the normal of the side on which a point lies.
 #[inline(always)]
 fn block_normal(own: &Vector3<f64>, half: &Vector3<f64>) -> Vector3<f64> {
     let x = own.x.abs() / half.x;

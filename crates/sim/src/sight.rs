@@ -1,28 +1,28 @@
-//! Which solids can be met by rays through a part of an image: those that reach
-//! into the pyramid which the eye and the part's edges make.
+//! Selection of the solids that rays through a part of an image can hit: those that intersect the
+//! pyramid between the eye and the edges of the part.
 
 use nalgebra::{Point3, Vector3};
 
 use crate::seen::SolidView;
 use crate::shape::Shape;
 
-/// A solid before an eye.
+/// A solid in front of an eye.
 pub struct SightedSolid<'a> {
-    /// Its number among all solids.
+    /// Index among all solids.
     pub number: u32,
-    /// The person that it belongs to, if it does.
+    /// The person that it belongs to, if any.
     pub person: Option<u16>,
     /// The solid.
     pub shape: &'a Shape,
-    /// As rays meet it.
+    /// View of the solid, for intersections with rays.
     pub seen: SolidView,
-    /// Nothing of it is closer to the eye along the optical axis, m.
+    /// Minimum depth of the solid along the optical axis, m.
     pub nearest: f64,
     eye: Point3<f64>,
 }
 
-/// Returns the solids that are not behind an eye which looks along the unit vector `forward`, and reach
-/// between two planes through it, each given by two rays; nearest first.
+/// Returns the solids that are not behind an eye that looks along the unit vector `forward`, and
+/// that extend between two planes through the eye, each given by two rays; nearest first.
 pub fn before<'a>(
     solids: impl Iterator<Item = (Option<u16>, &'a Shape)>,
     eye: &Point3<f64>,
@@ -46,8 +46,8 @@ pub fn before<'a>(
     sights
 }
 
-/// Those that reach between two planes through the eye. Each is given by two
-/// rays in it, and the other's rays are on its inner side.
+/// Returns the solids that extend between two planes through the eye. Each plane is given by two
+/// rays in it, and the rays of the other are on its inner side.
 pub fn between<'s, 'a>(
     sights: impl IntoIterator<Item = &'s SightedSolid<'a>>,
     one: [Vector3<f64>; 2],

@@ -1,4 +1,4 @@
-//! A scene in motion: the events that a robot would record, in the order in which it would.
+//! A running scene: the events that a robot would record, in the order of recording.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -50,39 +50,41 @@ use sensing::Sensing;
 use sight::sight;
 use walkers::{approaching_person, walkers};
 
-/// People, robot and odometry move in steps of this many nanoseconds.
+/// Time step of people, robot and odometry, ns.
 const STEP_NS: u64 = 20_000_000;
-/// People keep this far away from the middle of the robot, m.
+/// Minimum distance of people from the middle of the robot, m.
 const ROBOT_M: f64 = 0.5;
-/// They expect it to go on by about this much, m.
+/// Distance by which people expect the robot to move on, m.
 const GOES_M: f64 = 0.6;
-/// Rays in so many directions, and at these heights, m, feel for things around
-/// the robot.
+/// Number of directions of rays that measure the distance to objects around the robot, and their
+/// heights, m.
 const FEELERS: usize = 48;
 const FEELERS_M: [f64; 4] = [0.15, 0.45, 0.8, 1.2];
-/// Half the distance of the places on which the robot stands, m: it tilts little by little at the
+/// Half the distance between the points on which the robot stands, m: it tilts gradually at the
 /// ends of a ramp.
 const STANDS_ON_M: f64 = 0.15;
 /// Half the width of a person, m.
 const BODY_M: f64 = 0.2;
-/// So many points of an approacher must be in view of a camera to count as seen.
+/// Minimum number of points of an approacher that must be in view of a camera for it to count as
+/// seen.
 const LEAST_SPOTS: usize = 2;
 /// Visible fraction below which no detector can be expected to find a person.
 const LEAST_VISIBLE: f64 = 0.2;
 
-/// Something that the robot records.
+/// Recorded event.
 #[derive(Clone, Debug)]
 pub enum Event {
     /// The odometry.
     Odometry(OdometryReading),
-    /// The odometry is silent where it would have spoken: a step of the simulation all the same.
+    /// The odometry is silent at a time when it would have published; a step of the simulation
+    /// nevertheless.
     NoOdometry {
-        /// Since the start, ns.
+        /// Time since the start, ns.
         at_ns: u64,
     },
     /// An image, or a pair of them, with the truth.
     Shot(Box<Shot>),
-    /// A reading of a further sensor of obstacles.
+    /// A reading of a further obstacle sensor.
     Sensor(SensorReading),
     /// An image of a camera in the room.
     Webcam(WebcamShot),
@@ -99,12 +101,12 @@ impl Event {
     }
 }
 
-/// Images of a camera in the room; they are neither lost nor late.
+/// Images of a camera in the room; they are never lost or late.
 #[derive(Clone, Debug)]
 pub struct WebcamShot {
-    /// Which one, from 0 in the order of the scene.
+    /// Index of the camera, from 0 in the order of the scene.
     pub webcam: usize,
-    /// Since the start, ns.
+    /// Time since the start, ns.
     pub captured_ns: u64,
     /// The image.
     pub image: Arc<RgbImage>,
@@ -113,17 +115,17 @@ pub struct WebcamShot {
 /// Pose and speed as the odometry measures them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OdometryReading {
-    /// Since the start, ns.
+    /// Time since the start, ns.
     pub at_ns: u64,
-    /// The same by the stamp of the message, ns: another time if a clock is wrong.
+    /// Time in the stamp of the message, ns; it differs if a clock is wrong.
     pub stamp_ns: u64,
-    /// The robot in the frame of the odometry, m and rad.
+    /// Pose of the robot in the odometry frame, m and rad.
     pub odom_from_robot: Isometry2<f64>,
-    /// Forward, m/s.
+    /// Forward speed, m/s.
     pub speed_mps: f64,
-    /// About the vertical, rad/s.
+    /// Turn rate about the vertical, rad/s.
     pub turn_rate: f64,
-    /// The left and the right wheel.
+    /// Encoders of the left and the right wheel.
     pub encoders: [Encoder; 2],
     /// Forward speed of the last command, m/s.
     pub commanded_mps: f64,
@@ -131,76 +133,75 @@ pub struct OdometryReading {
     pub commanded_turn_rate: f64,
 }
 
-/// Images of the camera, and the truth at that moment.
+/// Images of the camera, and the truth at that time.
 #[derive(Clone, Debug)]
 pub struct Shot {
-    /// Since the start, ns.
+    /// Time since the start, ns.
     pub captured_ns: u64,
-    /// The same by the stamp of the message, ns: another time if the robot's clock is wrong.
+    /// Time in the stamp of the message, ns; it differs if the robot's clock is wrong.
     pub stamp_ns: u64,
-    /// When it arrives and is written to the log, ns; not before it was captured.
+    /// Time at which it arrives and is written to the log, ns; not before it was captured.
     pub recorded_ns: u64,
-    /// The same by the robot's clock, ns.
+    /// Time of arrival by the robot's clock, ns.
     pub arrived_ns: u64,
-    /// Stamp of the depth, ns: the offset of the camera later.
+    /// Stamp of the depth image, ns: later by the offset of the camera.
     pub depth_ns: u64,
-    /// The camera as the robot describes it at that time.
+    /// The camera as the robot describes it at this time.
     pub camera: Arc<Camera>,
     /// Colour and depth, the grey images of a stereo pair, or the circular image
     /// of a mirror.
     pub images: Images,
     /// Ranges of the rays of a laser scanner, m, in the order of [`LaserSettings::directions`];
-    /// `None` without one.
+    /// `None` without a scanner.
     pub laser: Option<Vec<f32>>,
-    /// Points of a 3-D lidar in its own frame, x ahead and z up, m; `None` without one.
+    /// Points of a 3-D lidar in its own frame, x forward and z up, m; `None` without a lidar.
     pub lidar: Option<Vec<[f32; 3]>>,
-    /// Everybody.
+    /// All people.
     pub truth: Vec<Truth>,
-    /// The robot in the world, m and rad.
+    /// Pose of the robot in the world, m and rad.
     pub world_from_robot: Isometry2<f64>,
 }
 
-/// Where one person really is.
+/// True position of one person.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Truth {
-    /// Number of the person, from 1.
+    /// ID of the person, from 1.
     pub id: u16,
     /// Centre of the head in the robot frame, m.
     pub head_in_robot: Point3<f64>,
     /// Middle of the trunk in the robot frame, m.
     pub torso_in_robot: Point3<f64>,
-    /// The upper-body square clipped to the image; `None` outside. A panorama
-    /// camera has it in the unwrapped image, where it may continue beyond the
-    /// right edge (see [`Panorama`]).
+    /// The upper-body square clipped to the image; `None` outside. For a panorama camera it is in
+    /// the unwrapped image, where it may continue beyond the right edge (see [`Panorama`]).
     pub upper_body: Option<Rect>,
-    /// The part that is seen, likewise.
+    /// The visible part, likewise.
     pub visible: Option<Rect>,
-    /// Seen fraction of the upper body.
+    /// Visible fraction of the upper body.
     pub visible_fraction: f64,
     /// Person that hides most of the rest.
     pub occluder: Option<u16>,
-    /// Hardly seen: neither a miss nor a false alarm.
+    /// True if the person is hardly visible: neither a miss nor a false positive.
     pub ignore: bool,
-    /// Shoulders, elbows, wrists, hips, knees and ankles; none where they are unknown.
+    /// Shoulders, elbows, wrists, hips, knees and ankles; empty if they are not known.
     pub joints: Vec<Joint>,
 }
 
-/// Free distance around a robot, m; negative is contact.
+/// Free distance around a robot, m; negative means contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Clearance {
-    /// To the nearest person; infinite where there is none.
+    /// Distance to the nearest person; infinite if there is none.
     pub people_m: f64,
-    /// To the nearest piece of furniture or wall.
+    /// Distance to the nearest piece of furniture or wall.
     pub things_m: f64,
 }
 
-/// A scene in motion. Same scene, same events, whatever the number of threads.
+/// A running scene. The same scene gives the same events, whatever the number of threads.
 pub struct Simulation {
     scene: Scene,
     camera: Arc<Camera>,
-    /// The camera as it was really mounted at the start ...
+    /// The camera with its true mount at the start ...
     first_camera: Camera,
-    /// ... and as it is now.
+    /// ... and at present.
     true_camera: Camera,
     injector: Injector,
     /// The mirror above the camera, if it is a panorama camera.
@@ -216,7 +217,8 @@ pub struct Simulation {
     approacher: Option<Approacher>,
     robot: Robot,
     exposures: [Exposure; 2],
-    /// Images of lenses that are drawn over again: new memory costs as much as some of the drawing.
+    /// Images of lenses that are reused, because allocating memory costs as much as part of the
+    /// rendering.
     canvases: Vec<HitImage>,
     chance: Random,
     now_ns: u64,
@@ -227,9 +229,10 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    /// The start of a scene. `threads` draw the images.
+    /// Starts a scene. `threads` is the number of threads that render images.
     pub fn new(scene: &Scene, threads: usize) -> Self {
-        // A stream for each purpose: one more chair must not change the gait of the people.
+        // Each purpose has its own stream, so that one more chair does not change the gait of the
+        // people.
         let mut pieces = scene.furniture.clone();
         pieces.extend(room::clutter(scene, &mut Random::new(scene.seed, 1)));
         pieces.extend(chairs(scene));
@@ -283,42 +286,40 @@ impl Simulation {
         }
     }
 
-    /// The camera as the log describes it; of a panorama camera the lens that
-    /// looks up into the mirror.
+    /// Returns the camera as the log describes it; for a panorama camera the lens that looks up
+    /// into the mirror.
     pub fn camera(&self) -> &Camera {
         &self.camera
     }
 
-    /// The mirror of a panorama camera as the log describes it, and the unwrapped
-    /// image in which the truth gives regions.
+    /// Returns the mirror of a panorama camera as the log describes it, and the unwrapped image in
+    /// which the truth gives regions.
     pub fn panorama(&self) -> Option<&Panorama> {
         self.mirror.as_ref().map(|mirror| &mirror.panorama)
     }
 
-    /// The 3-D lidar, if the robot has one.
+    /// Returns the 3-D lidar, if the robot has one.
     pub fn lidar(&self) -> Option<&LidarSettings> {
         self.scene.lidar.as_ref()
     }
 
-    /// The laser scanner, if the robot has one.
+    /// Returns the laser scanner, if the robot has one.
     pub fn laser(&self) -> Option<&LaserSettings> {
         self.scene.laser.as_ref()
     }
 
-    /// The cameras in the room; their `robot_from_camera` is their pose in the
-    /// **world**.
+    /// Returns the cameras in the room; their `robot_from_camera` is their pose in the **world**.
     pub fn webcams(&self) -> impl Iterator<Item = &Camera> {
         self.webcams.iter().map(Webcam::camera)
     }
 
-    /// Returns the furniture, including the clutter that is there by chance; places are in the
-    /// world.
+    /// Returns the furniture, including the random clutter; positions are in the world.
     pub fn furniture(&self) -> &[Furniture] {
         &self.pieces
     }
 
-    /// Commands the wheels from now on: the loop is closed, the scene's path
-    /// for the robot is left alone.
+    /// Commands the wheels from now on: this closes the loop, and the path of the scene for the
+    /// robot is ignored.
     pub fn steer(&mut self, command: WheelSpeeds) {
         self.robot.steer(self.now_ns as f64 * 1e-9, command);
     }
@@ -328,12 +329,13 @@ impl Simulation {
         self.injector.faults()
     }
 
-    /// Returns the time on the robot's clock, which faults may set, at a time since the start, ns.
+    /// Returns the time on the robot's clock, which faults may change, at a time since the start,
+    /// ns.
     pub fn robot_clock_ns(&self, at_ns: u64) -> u64 {
         self.injector.robot_clock_ns(at_ns)
     }
 
-    /// The next thing that the robot records; `None` at the end of the scene.
+    /// Returns the next event that the robot records; `None` at the end of the scene.
     pub fn next_event(&mut self) -> Option<Event> {
         let end_ns = (self.scene.duration_s * 1e9) as u64;
         loop {
@@ -351,14 +353,14 @@ impl Simulation {
         let (now_s, dt) = (self.now_ns as f64 * 1e-9, STEP_NS as f64 * 1e-9);
         let leader = self.walkers.first().map(|walker| walker.stance.place);
         // The order within a step matters: a robot reads its wheels before the camera of the same
-        // moment.
+        // time.
         self.robot.set_faults(self.injector.wheels(self.now_ns));
         self.robot.decide(now_s, leader);
         self.appear(now_s);
         let reading = self.read_odometry();
         let heard = self.injector.hear(reading);
         self.record(self.now_ns, heard);
-        // Before the camera, so that a frame has the readings of its own moment.
+        // Before the camera, so that a frame has the readings of its own time.
         self.sense();
         if self.now_ns >= due_ns {
             self.shots += 1;
@@ -392,7 +394,7 @@ impl Simulation {
 
     fn shoot(&mut self) {
         let faults = &self.scene.faults;
-        // Drawn for every image, so that a change of one fault leaves the others as they are.
+        // Drawn for every image, so that a change of one fault does not change the others.
         let (dropped, late) = (self.chance.chance(faults.dropped), self.chance.chance(faults.late));
         let delay_ns = (self.chance.between(0.05, 0.15) * 1e9) as u64;
         if dropped || self.injector.drops(self.now_ns) {
@@ -414,8 +416,8 @@ impl Simulation {
         }
         let (world, _) = self.world();
         for webcam in due {
-            // The numbers of webcams lie above those of the robot's images, whose noise must
-            // differ.
+            // The seeds of webcams must differ from those of the robot's images, so that their
+            // noise differs.
             let seed = self.scene.seed.rotate_left(20) ^ ((webcam as u64 + 1) << 40);
             let image = Arc::new(self.webcams[webcam].shoot(&world, seed));
             self.record(now_ns, Event::Webcam(WebcamShot { webcam, captured_ns: now_ns, image }));
@@ -424,7 +426,7 @@ impl Simulation {
 
     fn shot(&mut self, recorded_ns: u64) -> Shot {
         let (world, uppers) = self.world();
-        // The middle of the exposure: truth and scan are those of the middle row.
+        // The middle of the exposure, because truth and scan are those of the middle row.
         let pose = self.world_from_robot(0.5);
         let (seen, truth) = match &self.mirror {
             Some(mirror) => self.in_mirror(mirror, &world, &uppers, &pose),
@@ -462,13 +464,13 @@ impl Simulation {
         }
     }
 
-    /// Returns the people in the room, with their numbers.
+    /// Yields the people in the room, with their IDs.
     fn present(&self) -> impl Iterator<Item = (&Walker, u16)> {
         let now_s = self.now_ns as f64 * 1e-9;
         self.walkers.iter().zip(1..).filter(move |(walker, _)| walker.is_there(now_s))
     }
 
-    /// Everything there is now, and how many solids of each person are upper body.
+    /// Returns the world at present, and the number of upper-body solids of each person.
     fn world(&self) -> (World, Vec<usize>) {
         let mut people = Vec::new();
         let mut uppers = Vec::new();
@@ -484,16 +486,16 @@ impl Simulation {
         (World::new(&self.stage, people), uppers)
     }
 
-    /// Returns a person on the floor.
+    /// Returns the skeleton of a person standing on the floor.
     fn skeleton(&self, walker: &Walker) -> Skeleton {
         let floor_m = self.scene.room.floor_m(&walker.stance.place);
         Skeleton::new(&walker.person.build, &walker.stance).raised(floor_m)
     }
 
-    /// The robot's body in the world while a part of the image is taken, from the
-    /// upper edge, 0, to the lower, 1; it nods when it brakes.
+    /// Returns the pose of the robot's body in the world while a part of the image is exposed, from
+    /// the upper edge, 0, to the lower, 1; it pitches when it brakes.
     fn world_from_robot(&self, part: f64) -> Isometry3<f64> {
-        // A rolling shutter takes the rows one after the other, around the middle one.
+        // A rolling shutter exposes the rows one after the other, around the middle one.
         let since_middle = (part - 0.5) * self.scene.camera.rolling_shutter_s;
         let planar = self.robot.pose_after(since_middle);
         let nod = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), self.robot.nod_rad());
@@ -502,7 +504,7 @@ impl Simulation {
         let [before_m, at_m, behind_m] = [STANDS_ON_M, 0.0, -STANDS_ON_M]
             .map(|dx| self.scene.room.floor_m(&(at + Vector2::new(dx, 0.0))));
         let rise = before_m - behind_m;
-        // A rising floor lifts the nose of a robot that looks along the room.
+        // A rising floor lifts the nose of a robot that moves along the room.
         let slope =
             UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -rise.atan2(2.0 * STANDS_ON_M));
         Isometry3::from_parts(Translation3::new(at.x, at.y, at_m), slope * yaw * nod)
@@ -514,7 +516,7 @@ impl Simulation {
         Moment { seed, smear_px: turned * self.camera.focal_px(), gain }
     }
 
-    /// Returns an image to draw over.
+    /// Returns an image buffer to reuse.
     fn canvas(&mut self) -> HitImage {
         let Camera { width, height, .. } = self.true_camera;
         self.canvases.pop().unwrap_or_else(|| HitImage::nothing(width, height))
@@ -526,7 +528,7 @@ impl Simulation {
         if offset_s == 0.0 {
             return None;
         }
-        // The depth camera looks later, so the world is moved on and back again.
+        // The depth image is taken later, so the world is moved forward and back again.
         let (robot, walkers) = (self.robot.clone(), self.walkers.clone());
         let approacher = self.approacher.clone();
         let now_s = self.now_ns as f64 * 1e-9;
@@ -540,7 +542,7 @@ impl Simulation {
         Some(seen)
     }
 
-    /// Draws what a camera of the robot sees.
+    /// Renders the view of a camera of the robot into an existing image.
     fn draw_over(&self, seen: &mut HitImage, world: &World, camera: &Camera, lit: bool) {
         let view = WorldCamera { world, camera, pose: &|part| self.world_from_robot(part), lit };
         view.draw_over(seen, self.threads);
@@ -566,9 +568,10 @@ impl Simulation {
         Images { colour, depth, ..Images::default() }
     }
 
-    /// A turn of the robot smears the circle along itself, which is not drawn.
+    /// Returns the circular image of a panorama camera; the motion blur of a turning robot is not
+    /// rendered.
     fn circle(&mut self, seen: &HitImage) -> Images {
-        // A turn smears along circles, which the blur along rows cannot show.
+        // A turn blurs along circles, which the blur along rows cannot represent.
         let moment = Moment { smear_px: 0.0, ..self.moment(0, 1.0) };
         let colour = self.exposures[0].colour(seen, &moment);
         Images { colour: Some(Arc::new(colour)), ..Images::default() }
@@ -576,14 +579,14 @@ impl Simulation {
 
     fn stereo(&mut self, world: &World, left: &HitImage) -> Images {
         let mut camera = self.true_camera.clone();
-        // A fifth of a pixel is the error that rectification usually leaves.
+        // A fifth of a pixel is the usual error of rectification.
         let tilt = 0.2 / camera.focal_px();
         let aside = Translation3::new(self.scene.camera.baseline_m, 0.0, 0.0);
         let tilt = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), tilt);
         camera.robot_from_camera *= Isometry3::from_parts(aside, tilt);
         let mut right = self.canvas();
         self.draw_over(&mut right, world, &camera, true);
-        // The two sensors of a pair never expose quite alike.
+        // The two sensors of a pair never expose exactly alike.
         let moments = [self.moment(0, 1.0), self.moment(1, 1.03)];
         let grey = self.exposures[0].grey(left, &moments[0]);
         let image = self.exposures[1].grey(&right, &moments[1]);
@@ -627,8 +630,8 @@ impl Simulation {
         (seen, truth)
     }
 
-    /// `sight` returns how the upper body of a person appears: the region where it must be, and the
-    /// visible part of it; `spot` how a joint does.
+    /// Returns the truth. `sight` returns the appearance of a person's upper body: the region from
+    /// its position, and its visible part; `spot` does so for a joint.
     fn truth(
         &self,
         (world, uppers, pose): (&World, &[usize], &Isometry3<f64>),
@@ -665,9 +668,9 @@ fn camera(scene: &Scene) -> Camera {
     Camera::mounted(lens, settings.width, settings.height, settings.height_m, pitch, 0.0)
 }
 
-/// Returns the camera as mounted by hand, with errors about the pose that the log states.
+/// Returns the camera as it is really mounted, with errors relative to the pose in the log.
 fn shaken(camera: &Camera, degrees: f64, random: &mut Random) -> Camera {
-    // Clamped at two deviations, because a worse mount would be noticed and corrected.
+    // Clamped at two standard deviations, because a worse mount would be noticed and corrected.
     let [angles, shift] = [0, 1]
         .map(|_| Vector3::from([0, 1, 2].map(|_| degrees * random.normal().clamp(-2.0, 2.0))));
     let turn = Rotation3::new(angles.map(f64::to_radians));

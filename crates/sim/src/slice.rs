@@ -1,14 +1,15 @@
-//! Rays in one plane, as those of a laser scanner: most solids lie above or below all of them.
+//! Rays in one plane, such as those of a laser scanner: most solids are completely above or below
+//! it.
 
 use nalgebra::{Point3, Vector3};
 
 use crate::seen::SolidView;
 use crate::shape::Shape;
 
-/// Room for rounding, m.
+/// Margin for rounding, m.
 const SLACK_M: f64 = 1e-6;
 
-/// Solids that a plane cuts, for rays in it from one eye.
+/// Solids that a plane intersects, for rays in it from one eye.
 pub(crate) struct Slice<'a> {
     /// Start of the rays, m.
     pub eye: Point3<f64>,
@@ -16,7 +17,7 @@ pub(crate) struct Slice<'a> {
 }
 
 impl<'a> Slice<'a> {
-    /// Keeps those of some solids that the plane through an eye with this unit normal cuts, in their
+    /// Selects the solids that intersect the plane through an eye with this unit normal, in their
     /// order.
     pub fn new(
         solids: impl Iterator<Item = &'a Shape>,
@@ -26,7 +27,7 @@ impl<'a> Slice<'a> {
         let mut cut = Vec::new();
         for solid in solids {
             let above_m = normal.dot(&(solid.origin - eye));
-            // The ball around a solid is a cheap question to ask first.
+            // The test of the bounding ball is cheap, so it comes first.
             if solid.is_beside(&eye, normal) {
                 continue;
             }
@@ -39,12 +40,12 @@ impl<'a> Slice<'a> {
         Self { eye, solids: cut }
     }
 
-    /// Keeps all solids, for rays from an eye in any direction.
+    /// Selects all solids, for rays from an eye in any direction.
     pub fn around(solids: impl Iterator<Item = &'a Shape>, eye: Point3<f64>) -> Self {
         Self { eye, solids: solids.map(|solid| (solid, solid.seen_from(&eye))).collect() }
     }
 
-    /// Returns the first solid that a ray in the plane meets, and its distance in lengths of the ray.
+    /// Returns the first solid that a ray in the plane hits, and its distance in ray lengths.
     pub fn first(&self, ray: &Vector3<f64>) -> Option<(f64, &'a Shape)> {
         let per_length = 1.0 / ray.norm_squared();
         let mut first: Option<(f64, &'a Shape)> = None;

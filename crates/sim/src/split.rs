@@ -7,16 +7,16 @@ use std::str::FromStr;
 use serde::Serialize;
 use tagalong_config::{ConfigError, nearest};
 
-/// Seeds of one split.
+/// Number of seeds of one split.
 const SEEDS: u64 = 1_000_000_000;
-/// People in the pool of one split.
+/// Number of people in the pool of one split.
 pub const SUBJECTS: u64 = 500;
-/// Into how many slices a range is cut of which each split gets every third.
+/// Number of slices into which a range is divided; each split gets every third.
 const SLICES: u64 = 15;
 
-/// Purpose of a simulated log. A seed belongs to exactly one split, and all chance comes from the
-/// seed: noise, ways, clutter. People come from a pool of 500 for each split, and settings that a
-/// scene file varies `apart` take different values in each.
+/// Purpose of a simulated log. A seed belongs to exactly one split, and everything random comes
+/// from the seed: noise, paths, clutter. People come from a pool of 500 for each split, and
+/// settings that a scene file varies `apart` take different values in each.
 ///
 /// ```
 /// use tagalong_sim::Split;
@@ -26,21 +26,21 @@ const SLICES: u64 = 15;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Split {
-    /// To learn from: seeds from 0.
+    /// For training: seeds from 0.
     Train,
-    /// To choose settings by: seeds from 1 000 000 000.
+    /// For choosing settings: seeds from 1 000 000 000.
     Validation,
-    /// To report: seeds from 2 000 000 000.
+    /// For reported figures: seeds from 2 000 000 000.
     Test,
 }
 
 impl Split {
-    /// All of them.
+    /// All splits.
     pub const ALL: [Self; 3] = [Self::Train, Self::Validation, Self::Test];
-    /// The first number that is no seed.
+    /// The first number that is not a seed.
     pub const SEEDS_END: u64 = 3 * SEEDS;
 
-    /// The split that a seed belongs to.
+    /// Returns the split to which a seed belongs.
     pub fn of(seed: u64) -> Self {
         Self::ALL[(seed / SEEDS).min(2) as usize]
     }
@@ -50,7 +50,8 @@ impl Split {
         ["train", "validation", "test"][self.index() as usize]
     }
 
-    /// The seed with a number within the split; seeds of the split stay.
+    /// Returns the seed with this index within the split; a seed of the split is returned
+    /// unchanged.
     ///
     /// # Errors
     /// Seeds of another split.
@@ -69,10 +70,10 @@ impl Split {
         Err(ConfigError::new(message))
     }
 
-    /// Returns so many seeds of the split, from `first` on.
+    /// Returns `count` seeds of the split, starting with index `first`.
     ///
     /// # Errors
-    /// Seeds that the split does not have.
+    /// Seeds outside of the split.
     pub fn seeds(self, first: u64, count: u64) -> Result<Seeds, ConfigError> {
         let first = Self::number(self.seed(first)?);
         if first.saturating_add(count) <= SEEDS {
@@ -87,24 +88,24 @@ impl Split {
         Err(ConfigError::new(message))
     }
 
-    /// The number of a seed within its split.
+    /// Returns the index of a seed within its split.
     pub(crate) fn number(seed: u64) -> u64 {
         seed % SEEDS
     }
 
-    /// Returns a person of the pool as a number that no other split has.
+    /// Returns a number for a person of the pool that no other split has.
     pub(crate) fn subject(self, number: u64) -> u64 {
         self.index() * SUBJECTS + number % SUBJECTS
     }
 
-    /// The part of a range, both from 0 to 1, that a uniform number becomes.
+    /// Maps a uniform number to the part of a range that the split uses, both from 0 to 1.
     pub(crate) fn share(self, uniform: f64) -> f64 {
         let of_split = (SLICES / 3) as f64 * uniform.clamp(0.0, 1.0 - f64::EPSILON);
         let slice = 3.0 * of_split.floor() + self.index() as f64;
         (slice + of_split.fract()) / SLICES as f64
     }
 
-    /// True if the split gets the entry of a list.
+    /// Returns true if the split gets this entry of a list.
     pub(crate) fn has_entry(self, index: usize) -> bool {
         index as u64 % 3 == self.index()
     }
@@ -114,7 +115,7 @@ impl Split {
     }
 }
 
-/// Neighbouring seeds of a split. Together with the scene and its changed settings they determine
+/// Consecutive seeds of a split. Together with the scene and its changed settings they determine
 /// the simulation, so that others can repeat it.
 ///
 /// ```
@@ -131,7 +132,7 @@ pub struct Seeds {
 }
 
 impl Seeds {
-    /// Returns them as a [`Variant`](crate::Variant) takes them.
+    /// Returns the seeds as numbers for a [`Variant`](crate::Variant).
     pub fn numbers(self) -> Range<u64> {
         let start = self.split.index() * SEEDS + self.first;
         start..start + self.count

@@ -1,5 +1,5 @@
-//! Square parts of an image. Their pixels are sorted by the solids that their rays meet, because
-//! surfaces are rendered for [`LANES`] pixels of one solid at a time, wherever in the tile they are.
+//! Square parts of an image. Their pixels are sorted by the solids that their rays hit, because
+//! surfaces are rendered for [`LANES`] pixels of one solid at a time, at any position in the tile.
 
 use nalgebra::{Point3, Vector3};
 
@@ -10,46 +10,46 @@ use crate::shadow::{bits, bounds};
 use crate::sight::SightedSolid;
 use crate::world::Shading;
 
-/// A tile, with room that is used again for the next one.
+/// A tile with buffers that are reused for the next one.
 pub struct Tile {
     sorted: SortedTile,
     shading: Shading,
     group: HitGroup,
 }
 
-/// A tile in work.
+/// Parts of a tile while it is rendered.
 pub struct TileParts<'a> {
-    /// Its pixels.
+    /// Pixels.
     pub tile: &'a SortedTile,
-    /// Room for the solids that may shade it.
+    /// Buffer for the solids that may shade it.
     pub shading: &'a mut Shading,
-    /// Room for pixels of several rows.
+    /// Buffer for pixels of several rows.
     pub group: &'a mut HitGroup,
 }
 
 /// Pixels of a tile by the solids that they show.
 #[derive(Default)]
 pub struct SortedTile {
-    /// The first `used` ones are of this tile.
+    /// The first `used` batches belong to this tile.
     batches: Vec<Batch>,
     used: usize,
-    /// Batches of the same solid follow each other.
+    /// Entries of batches; those of the same solid follow each other.
     entries: Vec<Entry>,
-    /// Rows in which not all pixels show the same solid, with the batch that holds each.
+    /// Rows in which not all pixels show the same solid, with the index of their batch.
     rows: Vec<(u8, u32)>,
-    /// Those of them with pixels that show nothing.
+    /// Those of these rows with pixels that show nothing.
     open_rows: Vec<u8>,
-    /// Pixels of these rows, row by row, and by their solids.
+    /// Pixels of these rows, row by row, and sorted by solid.
     pixels: Vec<Pixel>,
     by_solid: Vec<Pixel>,
-    /// Pixels of each solid, and then the place of its next one.
+    /// Number of pixels of each solid, and then the position of its next one.
     places: Vec<u32>,
 }
 
-/// A batch by its solid.
+/// A batch with its solid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Entry {
-    /// Place of the solid among those of the tile.
+    /// Index of the solid among those of the tile.
     pub solid: u32,
     batch: u32,
 }
@@ -58,21 +58,21 @@ pub struct Entry {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 struct Pixel {
     solid: u32,
-    /// Place of the row among those of its kind.
+    /// Index of the row among those of its kind.
     row: u8,
     column: u8,
 }
 
-/// Rays that meet the same solid, or those of a row that do not.
+/// Rays that hit the same solid, or those of a row that hit different ones.
 #[derive(Clone)]
 pub struct Batch {
-    /// Lanes in use, from the first on.
+    /// Number of lanes in use, from the first on.
     pub count: usize,
     /// The rays.
     pub rays: Vectors,
-    /// Points where they meet the solid.
+    /// Points where they hit the solid.
     pub points: Vectors,
-    /// After so many lengths of the rays.
+    /// Distances in ray lengths.
     pub t: Lanes,
     /// Row and column of each pixel in the tile.
     places: [[u8; 2]; LANES],
@@ -87,8 +87,8 @@ impl Default for Tile {
 }
 
 impl Tile {
-    /// Casts some columns and rows of rays towards the solids that they may meet; `rays` writes those
-    /// of a row.
+    /// Casts some columns and rows of rays towards the solids that they may hit; `rays` writes
+    /// those of a row.
     pub fn look(
         &mut self,
         solids: &[&SightedSolid<'_>],
@@ -133,7 +133,7 @@ impl Tile {
 }
 
 impl SortedTile {
-    /// Returns the batches by their solids.
+    /// Returns the batches grouped by solid.
     pub fn solids(&self) -> impl Iterator<Item = &[Entry]> {
         self.entries.chunk_by(|one, next| one.solid == next.solid)
     }
@@ -143,7 +143,7 @@ impl SortedTile {
         &self.batches[entry.batch as usize]
     }
 
-    /// Returns the corners of a box around the points of some batches.
+    /// Returns the corners of a bounding box of the points of some batches.
     pub fn bounds_of(&self, entries: &[Entry]) -> [Vector3<f64>; 2] {
         let mut low = Vector3::repeat(f64::INFINITY);
         let mut high = -low;
@@ -169,7 +169,7 @@ impl SortedTile {
         self.used += 1;
     }
 
-    /// Puts the row of the next batch aside, whose pixels show several solids.
+    /// Stores the row of the next batch for later, because its pixels show several solids.
     fn mix(&mut self, row: u8, numbers: &[u64]) {
         let place = self.rows.len() as u8;
         self.rows.push((row, self.used as u32));
@@ -185,14 +185,14 @@ impl SortedTile {
         }
     }
 
-    /// Makes batches of the pixels that were put aside, and sorts all of them.
+    /// Makes batches of the pixels that were stored for later, and sorts all batches.
     fn sort(&mut self) {
         self.sort_pixels();
         let pixels = std::mem::take(&mut self.by_solid);
         for same in pixels.chunk_by(|one, next| one.solid == next.solid) {
             for part in same.chunks(LANES) {
                 self.next_batch();
-                // Rows that were put aside lie before it.
+                // The rows that were stored for later are before it.
                 let (before, next) = self.batches.split_at_mut(self.used);
                 next[0].gather(part, &self.rows, before);
                 self.keep_batch(part[0].solid);
@@ -202,7 +202,7 @@ impl SortedTile {
         self.entries.sort_unstable();
     }
 
-    /// Sorts the pixels by their solids: there are few of these, and the pixels of each are in order.
+    /// Sorts the pixels by solid: there are few solids, and the pixels of each are in order.
     fn sort_pixels(&mut self) {
         let Self { pixels, by_solid, places, .. } = self;
         let solids = pixels.iter().map(|pixel| pixel.solid as usize + 1).max().unwrap_or(0);
@@ -239,12 +239,12 @@ impl Batch {
         std::array::from_fn(|lane| lane < self.count)
     }
 
-    /// Returns the row that the batch is, from its first pixel to its last.
+    /// Returns the row that the batch covers, from its first pixel to its last.
     pub fn whole_row(&self) -> Option<usize> {
         self.row.map(usize::from)
     }
 
-    /// Returns row and column of each pixel of a batch that is no row.
+    /// Returns row and column of each pixel of a batch that is not a whole row.
     pub fn places(&self) -> &[[u8; 2]] {
         &self.places[..self.count]
     }
@@ -264,8 +264,8 @@ impl Batch {
     }
 }
 
-/// The first solid that each ray of depth one meets, by its place among solids that are sorted; and
-/// true if it is the same for all of them.
+/// Returns the first solid that each ray of depth one hits, by its index among sorted solids; and
+/// true if it is the same for all rays.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn first(sights: &[&SightedSolid<'_>], rays: &Vectors) -> (Met, bool) {
     let mut met = Met::NOTHING;

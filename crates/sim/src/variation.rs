@@ -1,7 +1,6 @@
-//! One scene file, any number of scenes: its table `[vary]` says which values
-//! differ from seed to seed, and a caller may set values from outside. Both
-//! happen to the TOML before it is read as a scene, so that a mistake is
-//! reported where it was written.
+//! Any number of scenes from one file: its table `[vary]` lists the values that differ from seed to
+//! seed, and a caller may set further values. Both are applied to the TOML before it is read as a
+//! scene, so that an error is reported at its position in the file.
 
 use std::ops::Range;
 
@@ -17,12 +16,12 @@ use crate::split::Split;
 const HOW: &str = "write { between = [low, high] }, { one_of = [...] }, { in_turn = [...] } or \
     { same_as = \"key\" }";
 
-/// Which of the scenes that a file describes.
+/// Selection of one of the scenes that a file describes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Variant {
-    /// Use this seed instead of the file's: within `split` if one is given.
+    /// Seed to use instead of the one in the file: an index within `split` if that is given.
     pub seed: Option<u64>,
-    /// Take the seed from this split.
+    /// Split from which the seed is taken.
     pub split: Option<Split>,
     /// Values that replace those of the file and of its variations: dotted keys, with indices into
     /// lists (`people.0.speed_mps`), and values as in TOML, where words need no quotes.
@@ -30,17 +29,17 @@ pub struct Variant {
 }
 
 impl Variant {
-    /// The scene of a seed.
+    /// Selects the scene of a seed.
     pub fn of_seed(seed: u64) -> Self {
         Self { seed: Some(seed), ..Self::default() }
     }
 
-    /// The scene of a number within a split.
+    /// Selects the scene with this index within a split.
     pub fn of_split(split: Split, number: u64) -> Self {
         Self { seed: Some(number), split: Some(split), set: Vec::new() }
     }
 
-    /// The same with one more value set.
+    /// Returns the variant with one more value set.
     pub fn with(mut self, key: &str, value: impl ToString) -> Self {
         self.set.push((key.to_owned(), value.to_string()));
         self
@@ -52,7 +51,7 @@ impl Variant {
     }
 }
 
-/// Reads a file of scenes as the table of one scene, hands it to `read`, and returns the result.
+/// Reads a file of scenes as the table of one scene, passes it to `read`, and returns the result.
 pub fn one_scene<T>(
     text: &str,
     variant: &Variant,
@@ -70,7 +69,7 @@ fn resolve<T>(
         variant.set.iter().enumerate().map(|(i, s)| argument(text, i, s)).collect();
     let mut written = DeTable::parse(text)?.into_inner();
     let mut rules = Rule::all(written.remove("vary"))?;
-    // A seed that was set counts for what is drawn, too.
+    // A seed that was set also determines the drawn values.
     apply(&mut written, set.iter().filter(|change| change.key == "seed"))?;
     rules.retain(|rule| !set.iter().any(|change| is_within(&rule.key, &change.key)));
     let seed = variant.choose(seed_of(&written))?;
@@ -91,7 +90,7 @@ fn apply<'a>(
     changes.into_iter().try_for_each(|change| change.apply(root))
 }
 
-/// True if `key` is `outer` or lies in it.
+/// Returns true if `key` is `outer` or is inside of it.
 fn is_within(key: &str, outer: &str) -> bool {
     key.strip_prefix(outer).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
 }
@@ -104,13 +103,14 @@ fn seed_of(root: &DeTable<'_>) -> u64 {
 /// A value to put at a key.
 struct Change {
     key: String,
-    /// The value as TOML.
+    /// The value in TOML.
     value: String,
-    /// Where it was asked for.
+    /// Position of the request, for errors.
     span: Range<usize>,
 }
 
-/// Arguments count as standing behind the end of the text, one byte each.
+/// Returns the change of an argument. For errors, arguments count as following the end of the text,
+/// one byte each.
 fn argument(text: &str, index: usize, (key, value): &(String, String)) -> Change {
     let at = text.len() + 1 + index;
     let value = match DeValue::parse(value) {
@@ -120,7 +120,7 @@ fn argument(text: &str, index: usize, (key, value): &(String, String)) -> Change
     Change { key: key.clone(), value, span: at..at + 1 }
 }
 
-/// Names the argument at which an error arose that has no place in the text.
+/// Names the argument in an error that has no position in the text.
 fn blame_argument(error: ConfigError, text: &str, variant: &Variant) -> ConfigError {
     let index = error.span.as_ref().and_then(|span| span.start.checked_sub(text.len() + 1));
     match index.and_then(|index| variant.set.get(index)) {
@@ -136,7 +136,7 @@ impl Change {
         Ok(())
     }
 
-    /// The place of the key; tables that are not there come into being.
+    /// Returns the place of the key; missing tables are created.
     fn slot<'a, 'r>(
         &'a self,
         root: &'r mut DeTable<'a>,
@@ -187,7 +187,7 @@ fn is_index(part: &str) -> bool {
     part.bytes().all(|byte| byte.is_ascii_digit())
 }
 
-/// The value with all its places replaced by one.
+/// Returns the value with all its spans replaced by one.
 fn moved<'a>(value: DeValue<'a>, span: &Range<usize>) -> Spanned<DeValue<'a>> {
     let value = match value {
         DeValue::Array(list) => {
@@ -209,7 +209,7 @@ struct Rule {
     key: String,
     span: Range<usize>,
     source: Source,
-    /// Other values in every split.
+    /// True for different values in every split.
     apart: bool,
 }
 
@@ -221,7 +221,7 @@ enum Source {
     SameAs(String),
 }
 
-/// A rule as it is written.
+/// A rule as it is written in the file.
 #[derive(Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct Written {
@@ -233,7 +233,7 @@ struct Written {
 }
 
 impl Rule {
-    /// All rules of `[vary]`, whether its keys are quoted or nested.
+    /// Returns all rules of `[vary]`, whether its keys are quoted or nested.
     fn all(vary: Option<Spanned<DeValue<'_>>>) -> Result<Vec<Self>, ConfigError> {
         let mut rules = Vec::new();
         vary.map_or(Ok(()), |vary| Self::collect(String::new(), vary, &mut rules))?;
@@ -279,7 +279,7 @@ impl Rule {
         Ok(Self { key, span, source, apart })
     }
 
-    /// The value for a seed; `None` for copies of other values.
+    /// Returns the value for a seed; `None` for copies of other values.
     fn draw(&self, seed: u64) -> Option<Change> {
         let split = Split::of(seed);
         let mut random = Random::new(seed, stream(&self.key));
@@ -306,7 +306,7 @@ impl Rule {
         Some(Change { key: self.key.clone(), value, span: self.span.clone() })
     }
 
-    /// The entries of a list that a split may have.
+    /// Returns the entries of a list that a split may use.
     fn entries<'a>(&self, values: &'a [toml::Value], split: Split) -> Vec<&'a toml::Value> {
         values
             .iter()
@@ -316,7 +316,7 @@ impl Rule {
             .collect()
     }
 
-    /// The copy of another value, if that is the rule.
+    /// Returns the copy of another value, if the rule is a copy.
     fn copy(&self, root: &DeTable<'_>) -> Result<Option<Change>, ConfigError> {
         let Source::SameAs(other) = &self.source else { return Ok(None) };
         let value = find(root, other)
@@ -331,7 +331,7 @@ impl Rule {
     }
 }
 
-/// The value at a dotted key.
+/// Returns the value at a dotted key.
 fn find<'r, 'a>(root: &'r DeTable<'a>, key: &str) -> Option<&'r Spanned<DeValue<'a>>> {
     let (first, rest) = key.split_once('.').unwrap_or((key, ""));
     let mut parts = rest.split('.').filter(|part| !part.is_empty());
@@ -342,14 +342,14 @@ fn find<'r, 'a>(root: &'r DeTable<'a>, key: &str) -> Option<&'r Spanned<DeValue<
     })
 }
 
-/// Returns the stream of random numbers of a key, far from the small numbers of the streams that
-/// the simulation uses.
+/// Returns the stream of random numbers of a key, far from the small numbers of the streams in the
+/// simulation.
 fn stream(key: &str) -> u64 {
     fingerprint(key.bytes()) | 1 << 63
 }
 
 impl Written {
-    /// `None` unless it says exactly one thing.
+    /// Returns the source of the value; `None` unless exactly one is given.
     fn source(self) -> Option<Source> {
         match (self.between, self.one_of, self.in_turn, self.same_as) {
             (Some([low, high]), None, None, None) => range(&low, &high),

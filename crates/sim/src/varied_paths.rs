@@ -1,5 +1,5 @@
-//! Paths of the followed person that differ from seed to seed, so that rides of a scene are not one
-//! path with other noise.
+//! Paths of the followed person that differ from seed to seed, so that rides of a scene do not all
+//! have the same path with different noise.
 
 use tagalong_math::fingerprint;
 
@@ -7,17 +7,17 @@ use crate::random::Random;
 use crate::scene::{RobotSettings, Scene};
 use crate::split::Split;
 
-/// Distance from furniture within which a way-point keeps its place, m: it leads through a doorway or
-/// round a corner.
+/// Distance from furniture within which a way-point is not moved, m, because it leads through a
+/// doorway or around a corner.
 const FURNITURE_M: f64 = 1.0;
-/// Distance from walls, and from the start of the robot, of a moved way-point, m.
+/// Minimum distance of a moved way-point from walls, and from the start of the robot, m.
 const WALL_M: f64 = 0.5;
 const ROBOT_M: f64 = 0.9;
-/// Places that are tried for a way-point before it keeps its own.
+/// Number of positions that are tried before a way-point keeps its own.
 const TRIES: usize = 20;
 
 impl Scene {
-    /// Returns the scene with the paths of its seed, and without the settings of the variation.
+    /// Returns the scene with the paths for its seed, and without the settings of the variation.
     pub(crate) fn with_varied_paths(mut self) -> Self {
         let variation = std::mem::take(&mut self.variation);
         if variation.is_off() {
@@ -52,7 +52,7 @@ impl Scene {
         self.people[0] = person;
     }
 
-    /// Returns a shift that no other split has, m.
+    /// Returns a shift that occurs in no other split, m.
     fn shift_m(&self, jitter_m: f64, random: &mut Random) -> f64 {
         jitter_m * (2.0 * Split::of(self.seed).share(random.uniform()) - 1.0)
     }
@@ -68,7 +68,7 @@ impl Scene {
             && distance_m(self.robot.start, point) >= ROBOT_M
     }
 
-    /// Exchanges left and right.
+    /// Mirrors the scene from left to right.
     fn mirror(&mut self) {
         let width_m = self.room.size_m[1];
         let RobotSettings { start, path, heading_deg, .. } = &mut self.robot;

@@ -1,5 +1,5 @@
-//! Cameras that hang in the room and do not move: an external measurement
-//! system, as a laboratory builds it from webcams.
+//! Fixed cameras in the room: an external measurement system, as a laboratory would build it from
+//! webcams.
 
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use tagalong_core::{RgbImage, settings};
@@ -10,15 +10,15 @@ use crate::sensor::{Exposure, Moment};
 use crate::world::World;
 
 settings! {
-    /// A camera at a fixed place.
+    /// A camera at a fixed position.
     pub struct WebcamSettings {
-        /// Where it hangs, m.
+        /// Position, m.
         pub at: [f64; 2] = [0.1, 0.1],
         /// Height above the floor, m.
         pub height_m: f64 = 2.2,
-        /// Where it looks, degrees.
+        /// Heading, degrees.
         pub heading_deg: f64 = 45.0,
-        /// Looks this far down, degrees.
+        /// Pitch, degrees downwards.
         pub pitch_down_deg: f64 = 15.0,
         /// Horizontal field of view, degrees.
         #[schemars(range(min = 10.0, max = 150.0))]
@@ -36,7 +36,7 @@ settings! {
 }
 
 impl WebcamSettings {
-    /// The camera; its `robot_from_camera` is its pose in the **world**.
+    /// Returns the camera; its `robot_from_camera` is its pose in the **world**.
     pub fn camera(&self) -> Camera {
         let f = 0.5 * self.width as f64 / (0.5 * self.field_of_view_deg.to_radians()).tan();
         let lens = Pinhole::centred(f, self.width, self.height);
@@ -51,7 +51,7 @@ impl WebcamSettings {
     }
 }
 
-/// A camera at a fixed place, at work.
+/// A running camera at a fixed position.
 #[derive(Clone, Debug)]
 pub(crate) struct Webcam {
     camera: Camera,
@@ -62,7 +62,7 @@ pub(crate) struct Webcam {
 }
 
 impl Webcam {
-    /// `threads` draw its images.
+    /// Creates the camera; `threads` is the number of threads that render its images.
     pub(crate) fn new(settings: &WebcamSettings, threads: usize) -> Self {
         let exposure = Exposure::new(threads);
         Self { camera: settings.camera(), rate_hz: settings.rate_hz, exposure, shots: 0, threads }
@@ -72,14 +72,14 @@ impl Webcam {
         &self.camera
     }
 
-    /// True once for each image.
+    /// Returns true once for each image.
     pub(crate) fn due(&mut self, now_ns: u64) -> bool {
         let due = now_ns >= (self.shots as f64 * 1e9 / self.rate_hz) as u64;
         self.shots += u64::from(due);
         due
     }
 
-    /// An image; `seed` is the noise of the webcam.
+    /// Renders an image; `seed` determines its noise.
     pub(crate) fn shoot(&mut self, world: &World, seed: u64) -> RgbImage {
         let seen = draw(world, &self.camera, &Isometry3::identity(), self.threads);
         let seed = seed ^ (self.shots << 2);

@@ -18,68 +18,69 @@ use crate::slice::Slice;
 pub struct Object {
     /// The solids.
     pub shapes: Vec<Shape>,
-    /// The number of the person, if it is one.
+    /// ID of the person, if it is one.
     pub person: Option<u16>,
-    /// Walls do not: the lamps hang inside of them.
+    /// True if it casts a shadow. Walls do not, because the lamps hang inside of them.
     pub casts_shadow: bool,
 }
 
 impl Object {
-    /// Solids that belong together.
+    /// Creates an object.
     pub fn new(shapes: Vec<Shape>, person: Option<u16>, casts_shadow: bool) -> Self {
         Self { shapes, person, casts_shadow }
     }
 
-    /// Lifts the solids by so much, m.
+    /// Returns the object raised by `by_m`, m.
     pub fn raised(mut self, by_m: f64) -> Self {
         self.shapes.iter_mut().for_each(|shape| *shape = shape.raised(by_m));
         self
     }
 
-    /// The solids with the person to whom they belong.
+    /// Yields the solids with the person that they belong to.
     fn solids(&self) -> impl Iterator<Item = (Option<u16>, &Shape)> + Clone {
         self.shapes.iter().map(|shape| (self.person, shape))
     }
 }
 
-/// Sunlight in which half of the contrast of projected dots is left, lx: a light wall in 20 000 lx
-/// has depth up to 1.3 m. A choice, not a measurement: no table of depth by illuminance was found,
-/// only that such cameras hardly measure anything out of doors.
+/// Sunlight at which half of the contrast of projected dots is left, lx: a light wall in 20 000 lx
+/// has depth up to 1.3 m. This is a choice and not a measurement: no table of depth by illuminance
+/// was found, only the statement that such cameras hardly measure anything outdoors.
 const WASHED_OUT_LUX: f64 = 200.0;
 
-/// Least cosine between the direction of sound and the normal of a large smooth surface that sends it
-/// back: that of 30 degrees.
+/// Minimum cosine between the direction of sound and the normal of a large smooth surface that
+/// reflects it back: that of 30 degrees.
 const ECHO_COSINE: f64 = 0.866;
 
-/// Ways to lamps begin this far off a surface, which would otherwise shade itself, m.
+/// Distance from a surface at which rays to lamps begin, m; otherwise the surface would shade
+/// itself.
 const OFF_SURFACE_M: f64 = 1e-3;
 
-/// A lamp: a point that shines on all sides.
+/// A lamp: a point light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lamp {
-    /// Where it hangs, m.
+    /// Position, m.
     pub at: Point3<f64>,
     /// Illuminance of a facing surface at one metre, lx.
     pub lux_at_1m: f64,
-    /// Openings through which the sun shines; none for a lamp in the room.
+    /// Openings through which the sun shines; `None` for a lamp in the room.
     pub windows: Option<Windows>,
 }
 
-/// Everything that never moves, in the coordinates of the world.
+/// Everything that never moves, in world coordinates.
 #[derive(Clone, Debug, Default)]
 pub struct Stage {
     /// Room and furniture.
     pub objects: Vec<Object>,
-    /// Lamps; all of them cast shadows.
+    /// Lamps, all of which cast shadows.
     pub lamps: Vec<Lamp>,
-    /// Light from everywhere, lx.
+    /// Ambient light, lx.
     pub ambient_lux: f64,
-    /// One for each lamp, made when they are first asked for.
+    /// Shadows of each lamp, computed when they are first needed.
     shadows: OnceLock<Vec<Shadows>>,
 }
 
 impl Stage {
-    /// Things that stay where they are.
+    /// Creates a stage of objects that never move.
     pub fn new(objects: Vec<Object>, lamps: Vec<Lamp>, ambient_lux: f64) -> Self {
         Self { objects, lamps, ambient_lux, shadows: OnceLock::new() }
     }
@@ -96,46 +97,46 @@ impl Stage {
     }
 }
 
-/// Everything at one moment, in the coordinates of the world.
+/// Everything at one moment, in world coordinates.
 #[derive(Clone, Debug, Default)]
 pub struct World {
     /// Everything that never moves, the same at every moment.
     pub stage: Arc<Stage>,
     /// The people.
     pub people: Vec<Object>,
-    /// Shadows of people, one for each lamp, made when they are first asked for: the world does
-    /// not change after that.
+    /// Shadows of people for each lamp, computed when they are first needed; the world does not
+    /// change after that.
     shadows: OnceLock<Vec<Shadows>>,
 }
 
-/// First surface that a ray meets.
+/// First surface that a ray hits.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Hit {
-    /// Distance in lengths of the ray; infinite where there is nothing.
+    /// Distance in ray lengths; infinite if there is nothing.
     pub t: f64,
     /// Light towards the eye in each colour, lx times reflectance.
     pub light: Colour,
-    /// Reflectance in the near infrared, less what sunlight washes out.
+    /// Reflectance in the near infrared, reduced by sunlight.
     pub infrared: f64,
-    /// Cosine between the surface's normal and the way back.
+    /// Cosine between the surface's normal and the ray back.
     pub facing: f64,
     /// The person, if it is one.
     pub person: Option<u16>,
 }
 
 impl World {
-    /// People on a stage.
+    /// Creates the world of some people on a stage.
     pub fn new(stage: &Arc<Stage>, people: Vec<Object>) -> Self {
         Self { stage: Arc::clone(stage), people, shadows: OnceLock::new() }
     }
 
-    /// All solids with the person to whom they belong, if they do.
+    /// Yields all solids with the person that they belong to, if any.
     pub(crate) fn solids(&self) -> impl Iterator<Item = (Option<u16>, &Shape)> + Clone {
         self.stage.objects.iter().chain(&self.people).flat_map(Object::solids)
     }
 
-    /// Returns the solids that may reflect the beam of a laser whose rays are in the plane through an
-    /// eye with this unit normal: it goes through glass.
+    /// Returns the solids that may reflect the beam of a laser whose rays are in the plane through
+    /// an eye with this unit normal; glass is excluded, because the beam passes through it.
     pub(crate) fn slice(&self, eye: Point3<f64>, normal: &Vector3<f64>) -> Slice<'_> {
         Slice::new(self.opaque().map(|(_, solid)| solid), eye, normal)
     }
@@ -145,8 +146,8 @@ impl World {
         Slice::around(self.opaque().map(|(_, solid)| solid), eye)
     }
 
-    /// Returns the range of a laser in a direction of length one in the plane of a slice, m; infinite
-    /// where it meets nothing. Mirrors send it on.
+    /// Returns the range of a laser in a direction of length one in the plane of a slice, m;
+    /// infinite if it hits nothing. Mirrors reflect it.
     pub(crate) fn distance(&self, slice: &Slice<'_>, ray: &Vector3<f64>) -> f64 {
         let Some((t, solid)) = slice.first(ray) else { return f64::INFINITY };
         if solid.material.reflects == 0.0 {
@@ -158,14 +159,15 @@ impl World {
         meet(others, &at, &on).map_or(f64::INFINITY, |(further, ..)| t + further)
     }
 
-    /// All solids but those of glass.
+    /// Yields all solids except those of glass.
     fn opaque(&self) -> impl Iterator<Item = (Option<u16>, &Shape)> + Clone {
         self.solids().filter(|(_, solid)| solid.material.passes == 0.0)
     }
 
-    /// Returns the range of an echo of sound in a direction of length one, m; infinite without one.
-    /// Glass and mirrors are surfaces as others. A large smooth one throws the sound away unless it
-    /// is met nearly straight on; edges and rough, small and round things scatter it.
+    /// Returns the range of a sound echo in a direction of length one, m; infinite without one.
+    /// Glass and mirrors are ordinary surfaces. A large smooth surface reflects the sound away
+    /// unless it is hit almost perpendicularly; edges and rough, small and round objects scatter
+    /// it.
     pub(crate) fn echo(&self, eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
         let Some((t, _, solid)) = meet(self.solids(), eye, ray) else { return f64::INFINITY };
         let normal = solid.normal(&solid.own(&(eye + ray * t)));
@@ -173,8 +175,8 @@ impl World {
         if is_oblique && solid.is_slab() { f64::INFINITY } else { t }
     }
 
-    /// The first of some solids that a ray meets, through glass and by way of mirrors: for rays
-    /// that have no eye in common, and the reference for those that have.
+    /// Returns the first of some solids that a ray hits, through glass and via mirrors: for rays
+    /// without a common eye, and as the reference for those with one.
     pub(crate) fn first<'a>(
         &'a self,
         solids: impl Iterator<Item = (Option<u16>, &'a Shape)>,
@@ -191,8 +193,8 @@ impl World {
         })
     }
 
-    /// Returns the view in a mirror or through glass; glass mirrors a little, too. Mirrors that
-    /// are seen in mirrors or through glass show their own surface only.
+    /// Returns the view in a mirror or through glass; glass also reflects a little. Mirrors that
+    /// are seen in mirrors or through glass show only their own surface.
     pub(crate) fn beyond(
         &self,
         seen: Hit,
@@ -208,19 +210,19 @@ impl World {
         let light = std::array::from_fn(|c| {
             own * seen.light[c] + reflects * image.light[c] + passes * behind.light[c]
         });
-        // Projected dots go the way of most of the light, there and back.
+        // Projected dots take the path of most of the light, in both directions.
         let (share, main) = if passes > reflects { (passes, behind) } else { (reflects, image) };
         Hit { t: seen.t + main.t, light, infrared: share * share * main.infrared, ..main }
     }
 
-    /// Returns what a ray from a point of a shape meets first.
+    /// Returns the first hit of a ray from a point of a shape.
     fn look_from(&self, of: &Shape, at: &Point3<f64>, ray: &Vector3<f64>) -> Hit {
         let others = self.solids().filter(|(_, other)| !ptr::eq(*other, of));
         meet(others, at, ray)
             .map_or(Hit::NOTHING, |(t, person, shape)| self.hit(t, person, shape, (at, ray)).0)
     }
 
-    /// Returns the surface of a solid that a ray from an eye meets after `t` lengths of it, and its
+    /// Returns the surface of a solid that a ray from an eye hits at `t` ray lengths, and its
     /// normal.
     fn hit(
         &self,
@@ -238,7 +240,7 @@ impl World {
         (Hit { t, light, infrared: left_over(of.material.infrared, sun), facing, person }, normal)
     }
 
-    /// Illuminance of a point with this normal, and the part of it that the sun has, lx.
+    /// Returns the illuminance of a point with this normal, and the part of it from the sun, lx.
     fn lux(&self, at: &Point3<f64>, normal: &Vector3<f64>) -> [f64; 2] {
         // Floors are lit by the ceiling, undersides by the floor, which is darker.
         let mut lux = [self.stage.ambient_lux * (0.75 + 0.25 * normal.z), 0.0];
@@ -259,7 +261,7 @@ impl World {
         found: &mut Shading,
     ) {
         found.0.resize_with(self.stage.lamps.len(), Default::default);
-        // Ways begin a little off the surface.
+        // Rays begin slightly off the surface.
         let off = Vector3::repeat(2.0 * OFF_SURFACE_M);
         for ((lamp, shadows), found) in
             self.stage.lamps.iter().zip(self.shadows()).zip(&mut found.0)
@@ -278,8 +280,8 @@ impl World {
         lit || self.stage.lamps.iter().any(Lamp::is_sun)
     }
 
-    /// Writes light and infrared of points of the surface of a solid, of which only the `wanted` ones
-    /// count; without colours if it is not `lit`. `shading` are the solids that may shade them.
+    /// Writes light and infrared of points on the surface of a solid; only the `wanted` ones count.
+    /// There are no colours if it is not `lit`. `shading` are the solids that may shade the points.
     pub(crate) fn shine(
         &self,
         of: &Material,
@@ -331,12 +333,12 @@ impl World {
     }
 }
 
-/// Solids that may stand between each lamp and some points: numbers of those of the stage and of
-/// those of people.
+/// Solids that may be between each lamp and some points: indices of those of the stage and of those
+/// of people.
 #[derive(Debug, Default)]
 pub(crate) struct Shading(Vec<[Vec<u32>; 2]>);
 
-/// Returns the first of some solids that a ray meets, and its distance in lengths of the ray.
+/// Returns the first of some solids that a ray hits, and its distance in ray lengths.
 fn meet<'a>(
     solids: impl Iterator<Item = (Option<u16>, &'a Shape)>,
     eye: &Point3<f64>,
@@ -352,17 +354,17 @@ fn meet<'a>(
         .min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
-/// Returns the direction of a ray after a mirror with this normal.
+/// Returns the direction of a ray after reflection in a mirror with this normal.
 fn mirrored(ray: &Vector3<f64>, normal: &Vector3<f64>) -> Vector3<f64> {
     ray - normal * (2.0 * normal.dot(ray))
 }
 
-/// Returns the part of a reflectance that projected dots stand out with in so much sunlight, lx.
+/// Returns the part of a reflectance that is left for projected dots in this sunlight, lx.
 fn left_over(infrared: f64, sun_lux: f64) -> f64 {
     infrared / (1.0 + sun_lux / WASHED_OUT_LUX)
 }
 
-/// Returns the solids of each object that throw shadows; glass throws none.
+/// Returns the solids of each object that cast shadows; glass casts none.
 fn casters(
     objects: &[Object],
 ) -> impl Iterator<Item = impl Iterator<Item = &Shape> + Clone> + Clone {
@@ -370,7 +372,7 @@ fn casters(
     casters.map(|object| object.shapes.iter().filter(|solid| solid.material.passes == 0.0))
 }
 
-/// Illuminance by the light from everywhere, of surfaces with these normals.
+/// Returns the ambient illuminance of surfaces with these normals.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn ambient(lux: f64, normals: &Vectors) -> Lanes {
     let mut ambient = [0.0; LANES];
@@ -380,7 +382,7 @@ fn ambient(lux: f64, normals: &Vectors) -> Lanes {
     ambient
 }
 
-/// Adds the light of a lamp where the way from it is open, by the bits of lanes.
+/// Adds the light of a lamp in the lanes whose bits are set, where the ray from it is not blocked.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn add_light(of: &Lanes, open: u32, to: &mut Lanes) {
     for lane in 0..LANES {
@@ -388,7 +390,7 @@ fn add_light(of: &Lanes, open: u32, to: &mut Lanes) {
     }
 }
 
-/// Writes the light that surfaces of some colours send on, with their own.
+/// Writes the light that surfaces of some colours reflect, plus the light that they emit.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn reflect(colours: &[Lanes; 3], lux: &Lanes, glow_lux: f64, light: &mut [Lanes; 3]) {
     for channel in 0..3 {
@@ -398,7 +400,7 @@ fn reflect(colours: &[Lanes; 3], lux: &Lanes, glow_lux: f64, light: &mut [Lanes;
     }
 }
 
-/// Ways from a lamp to some points, and the illuminance there if nothing is in the way.
+/// Rays from a lamp to some points, and the illuminance there if nothing is in between.
 struct Beams {
     ways: Vectors,
     lux: Lanes,
@@ -427,12 +429,12 @@ impl Lamp {
         Self { at, lux_at_1m, windows: None }
     }
 
-    /// True for the sun, whose light has infrared, which that of lamps has not.
+    /// Returns true for the sun, whose light contains infrared, unlike that of lamps.
     fn is_sun(&self) -> bool {
         self.windows.is_some()
     }
 
-    /// Illuminance of a point with this normal, lx.
+    /// Returns the illuminance of a point with this normal, lx.
     fn on(&self, shadows: [&Shadows; 2], at: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
         let (way, lux) = self.beam(&at.coords, normal);
         let dark = lux == 0.0
@@ -441,15 +443,15 @@ impl Lamp {
         if dark { 0.0 } else { lux }
     }
 
-    /// Returns the way to a point with this normal, and its illuminance if nothing is in the way,
-    /// lx; zero where it faces away. Without branches, for loops over lanes.
+    /// Returns the ray to a point with this normal, and its illuminance if nothing is in between,
+    /// lx; zero if the point faces away. Without branches, for loops over lanes.
     #[inline(always)]
     fn beam(&self, at: &Vector3<f64>, normal: &Vector3<f64>) -> (Vector3<f64>, f64) {
         let start = at + normal * OFF_SURFACE_M;
         let way = self.at.coords - start;
         let square = dot(&way, &way);
         let cosine = dot(normal, &way) / square.sqrt();
-        // A lamp is not a point: close to it the light does not grow without end.
+        // A real lamp is not a point: close to it the light does not grow without limit.
         let square = if square > 0.25 { square } else { 0.25 };
         let lux = self.lux_at_1m * cosine / square;
         (start - self.at.coords, if cosine > 0.0 { lux } else { 0.0 })
@@ -457,13 +459,13 @@ impl Lamp {
 }
 
 impl Hit {
-    /// Result of a ray that meets nothing.
+    /// Result of a ray that hits nothing.
     pub const NOTHING: Self =
         Self { t: f64::INFINITY, light: [0.0; 3], infrared: 0.0, facing: 0.0, person: None };
 }
 
 /// Returns the distance to the first solid of some objects in a direction of length one, m;
-/// infinite where there is none.
+/// infinite if there is none.
 pub(crate) fn distance<'a>(
     objects: impl IntoIterator<Item = &'a Object>,
     eye: &Point3<f64>,

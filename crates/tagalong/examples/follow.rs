@@ -1,5 +1,5 @@
-//! Steers a robot after the person in front of it. The frames come from a log here, `people.mcap`; on
-//! a robot they come from its sensors, and a control loop asks `command_at` between them.
+//! Steers a robot behind the person in front of it. Here the frames come from a log, `people.mcap`;
+//! on a robot they come from its sensors, and a control loop calls `command_at` between them.
 #![allow(clippy::print_stdout, reason = "an example prints what it finds")]
 
 use tagalong::prelude::*;

@@ -27,10 +27,10 @@ const PARTS: [[f64; 3]; 5] = [
     [1.2, 0.17, 0.45],
 ];
 
-/// Returns the depth image of a floor, a wall at 5 m, and a person of 1.7 m before it, at 2.5 m.
+/// Returns the depth image of a floor, a wall at 5 m, and a person 1.7 m tall at 2.5 m.
 fn depth_image() -> DepthImage {
     DepthImage::from_fn(640, 480, |column, row| {
-        // Pixels of a metre at the distance of the person, and those below the horizon.
+        // Pixels per metre at the person's distance, and pixels below the horizon.
         let scale = 525.0 / 2.5;
         let below_px = row as f64 - 239.5;
         let across_m = (column as f64 - 319.5) / scale;

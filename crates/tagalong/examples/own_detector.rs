@@ -1,4 +1,4 @@
-//! Registers a detector of the program beside the built-in plugins, and tracks with it.
+//! Registers the program's own detector in addition to the built-in plugins, and tracks with it.
 #![allow(clippy::print_stdout, reason = "an example prints what it finds")]
 
 use tagalong::nalgebra::Matrix3;

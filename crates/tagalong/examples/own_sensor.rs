@@ -1,10 +1,10 @@
-//! People by a radar: a sensor that Tagalong does not know, and a detector that reads it.
+//! Detects people with a radar: a sensor that Tagalong does not know, and a detector that reads it.
 #![allow(clippy::print_stdout, reason = "an example prints what it finds")]
 
 use tagalong::nalgebra::Matrix3;
 use tagalong::prelude::*;
 
-/// Echo of a radar: its place in the robot frame, m, and the spread of speeds in it, m/s.
+/// Echo of a radar: position in the robot frame, m, and spread of its speeds, m/s.
 struct Echo {
     position: [f64; 2],
     spread_mps: f64,
@@ -17,7 +17,7 @@ impl Sensor for Radar {
     const INPUT: Input = Input::Named("radar");
 }
 
-/// Takes echoes in which arms and legs swing for people.
+/// Detects people by the echoes of swinging limbs.
 struct Swinging;
 
 impl Detector for Swinging {
@@ -72,7 +72,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// Returns the echoes of a moment: a person comes nearer, another one walks past, a pillar stands.
+/// Returns the echoes at a time: a person comes nearer, another walks past, a pillar stands.
 fn echoes(time_s: f64) -> Radar {
     let nearer = Echo { position: [5.0 - time_s, -1.0], spread_mps: 0.9 };
     let past = Echo { position: [3.0, 2.0 - 0.8 * time_s], spread_mps: 0.7 };

@@ -26,7 +26,7 @@ pub enum Error {
     Damaged {
         /// The log.
         log: std::path::PathBuf,
-        /// Lost part of the log, and its place.
+        /// The part of the log that is lost, and where it was.
         notes: String,
     },
     /// A controller lacks a source of data that it needs to drive.
@@ -35,18 +35,18 @@ pub enum Error {
     /// Images, a pose or a scan from which no frame can be made.
     #[error("the frame at {stamp} s: {why}")]
     Frame {
-        /// Time of the frame.
+        /// Time of the frame, s.
         stamp: tagalong_core::Stamp,
         /// The cause and the remedy.
         why: String,
     },
-    /// A plugin that failed at a frame.
+    /// A plugin failed at a frame.
     #[error(transparent)]
     Step(#[from] StepError),
-    /// A plugin that refuses its settings or an input.
+    /// A plugin refuses its settings or an input.
     #[error(transparent)]
     Plugin(#[from] tagalong_core::Error),
-    /// A person that cannot be followed.
+    /// The chosen person cannot be followed.
     #[error(transparent)]
     Enrollment(#[from] EnrollmentError),
 }

@@ -24,7 +24,7 @@ pub struct FrameMaker {
     previous: Option<(Stamp, Isometry2<f64>)>,
 }
 
-/// One moment of a [`FrameMaker`], to which the data of the sensors are added.
+/// The frame of one moment while it is built: the data of the sensors are added to it.
 #[must_use = "`frame` makes the frame of it"]
 pub struct Moment<'m> {
     maker: &'m mut FrameMaker,
@@ -32,7 +32,7 @@ pub struct Moment<'m> {
     camera: Arc<Camera>,
     index: Option<u64>,
     images: Images,
-    /// The data that are no images.
+    /// Readings of sensors other than cameras.
     sensors: Sensors,
     pose: Option<Isometry2<f64>>,
     odometry_age_s: f64,
@@ -70,14 +70,14 @@ impl FrameMaker {
 
     /// Returns the motion since the previous frame, and true if the odometry has jumped.
     fn motion(&mut self, stamp: Stamp, pose: Option<Isometry2<f64>>) -> (EgoMotion, bool) {
-        // Without a pose the robot counts as standing.
+        // Without a pose the robot is assumed to be at rest.
         let last = self.previous.map_or_else(Isometry2::identity, |(_, pose)| pose);
         let here = pose.unwrap_or(last);
         let previous = self.previous.replace((stamp, here));
         let Some((then, before)) = previous else { return (EgoMotion::at_rest(0.0), false) };
         let dt_s = stamp.seconds_since(then);
         let step_m = (here.translation.vector - before.translation.vector).norm();
-        // A long step over a gap may be travel.
+        // After a long gap a large step may be real motion.
         if step_m > MAX_ODOMETRY_STEP_M && (0.0..=MAX_ODOMETRY_GAP_S).contains(&dt_s) {
             return (EgoMotion::unknown(dt_s), true);
         }
@@ -111,14 +111,14 @@ impl Moment<'_> {
     }
 
     /// Adds the depth image: metres along the optical axis, registered to the colour image. NaN,
-    /// infinity, 0 and negative numbers are no readings. [`DepthImage::from_millimetres`] takes the
-    /// numbers of a camera.
+    /// infinity, 0 and negative numbers mean that there is no reading.
+    /// [`DepthImage::from_millimetres`] converts the millimetres of a depth camera.
     pub fn depth(mut self, image: impl Into<Arc<DepthImage>>) -> Self {
         self.images.depth = Some(image.into());
         self
     }
 
-    /// Adds the right image of a rectified stereo pair, with the distance of the two cameras.
+    /// Adds the right image of a rectified stereo pair, with the baseline of the pair, m.
     pub fn right(mut self, image: GreyImage, baseline_m: f64) -> Self {
         self.images.right = Some(Arc::new(RightImage { image, baseline_m }));
         self
@@ -172,7 +172,8 @@ impl Moment<'_> {
         self
     }
 
-    /// Returns the data that the frame has for a controller; see `Pipeline::check_sources`.
+    /// Returns the sources of data that this frame offers to a controller; see
+    /// `Pipeline::check_sources`.
     pub fn sources(&self) -> Sources {
         Sources {
             depth: self.images.depth.is_some(),
@@ -185,13 +186,14 @@ impl Moment<'_> {
     /// Makes the frame.
     ///
     /// # Errors
-    /// [`Error::Frame`]: images of another size than the camera's, images without a camera, images among
-    /// the other sensors, and a pose, an age or a baseline with impossible numbers.
+    /// [`Error::Frame`]: images whose size is not that of the camera, images without a camera,
+    /// images added with [`Moment::sensor`], and a pose, an age or a baseline with impossible
+    /// numbers.
     pub fn frame(self) -> Result<Frame> {
         if let Some(why) = self.mistake() {
             return Err(Error::Frame { stamp: self.stamp, why });
         }
-        // Without odometry its age is not 0, so that no robot is steered.
+        // An infinite age keeps a controller from steering without odometry.
         let age_s = if self.pose.is_some() { self.odometry_age_s } else { f64::INFINITY };
         let (motion, has_jumped) = self.maker.motion(self.stamp, self.pose);
         self.maker.count += 1;
@@ -204,10 +206,10 @@ impl Moment<'_> {
             .with_odometry_jump(has_jumped))
     }
 
-    /// Returns the reason for which the data make no frame, if there is one.
+    /// Returns the reason why no frame can be made from the data, if there is one.
     fn mistake(&self) -> Option<String> {
         self.misfit().or_else(|| {
-            // Images have functions of their own, which look at their size.
+            // Images have functions of their own, which check their size.
             let images = [Input::Colour, Input::Depth, Input::Right];
             if let Some(image) = images.into_iter().find(|image| self.sensors.holds(*image)) {
                 let name = image.name();
@@ -222,14 +224,14 @@ impl Moment<'_> {
             if self.pose.is_some_and(|pose| !is_finite(&pose)) {
                 return Some("the pose has numbers that are not finite; leave it out".to_owned());
             }
-            // Positive comparison, so that NaN is refused.
+            // Written as `>=`, so that NaN is rejected.
             let has_age = self.odometry_age_s >= 0.0;
             let age_s = self.odometry_age_s;
             (!has_age).then(|| format!("odometry_age_s is {age_s}; give 0 or more"))
         })
     }
 
-    /// Returns the words about an image of another size than the camera's, if there is one.
+    /// Returns a message about an image whose size is not that of the camera, if there is one.
     fn misfit(&self) -> Option<String> {
         let Images { colour, grey, depth, right } = &self.images;
         let sizes = [
@@ -256,8 +258,8 @@ impl Moment<'_> {
     }
 }
 
-/// Returns a depth image with NaN where there is no reading, which is all that plugins look for: the
-/// caller's may have zeros.
+/// Returns a depth image with NaN wherever there is no reading. Plugins test for NaN only, and the
+/// caller's image may have zeros.
 fn with_holes(depth: Arc<DepthImage>) -> Arc<DepthImage> {
     fn is_plain(metres: f32) -> bool {
         metres.is_nan() || DepthImage::is_reading(metres)

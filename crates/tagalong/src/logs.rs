@@ -15,14 +15,14 @@ pub struct Log {
     path: PathBuf,
 }
 
-/// Settings under which a log is read: those of the config of a pipeline.
+/// Settings with which a log is read, taken from the config of a pipeline.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct LogSettings {
     /// `[input]`: topics and frames of the images, with the sources of obstacles that the collision
     /// monitor uses.
     pub input: InputSettings,
-    /// `[limits]`: largest sizes of a log's parts.
+    /// `[limits]`: maximum sizes of the parts of a log.
     pub limits: Limits,
 }
 
@@ -48,7 +48,7 @@ impl Log {
         }
     }
 
-    /// Returns its path.
+    /// Returns the path of the log.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -81,7 +81,7 @@ impl Log {
 }
 
 impl LogSettings {
-    /// Returns the settings that a pipeline's config has for logs.
+    /// Returns the settings for logs in the config of a pipeline.
     ///
     /// # Errors
     /// A mistake in `[input]` or `[limits]`, with the line and the remedy.
@@ -94,24 +94,24 @@ impl LogSettings {
 }
 
 impl Frames {
-    /// Returns the frames of an opened source.
+    /// Returns the frames of a source that is already open.
     pub fn new(log: impl AsRef<Path>, source: FrameSource) -> Self {
         let log = log.as_ref().to_owned();
         Self { log, source, accepts_loss: false, has_ended: false }
     }
 
-    /// Accepts that part of the log is lost: the frames end without an error.
+    /// Accepts a log that is partly lost: the frames then end without an error.
     pub fn accept_loss(mut self) -> Self {
         self.accepts_loss = true;
         self
     }
 
-    /// Returns the data that the log has for a controller.
+    /// Returns the sources of data that the log offers to a controller.
     pub fn sources(&self) -> Sources {
         sources_of(&self.source)
     }
 
-    /// Returns the reader of the log: its facts, counters and notes.
+    /// Returns the reader of the log: its properties, counters and notes.
     pub fn source(&self) -> &FrameSource {
         &self.source
     }
@@ -134,7 +134,7 @@ impl Iterator for Frames {
     }
 }
 
-/// Returns the data that a log has for a controller.
+/// Returns the sources of data that a log offers to a controller.
 pub fn sources_of(source: &FrameSource) -> Sources {
     let facts = source.facts();
     Sources {
@@ -145,8 +145,8 @@ pub fn sources_of(source: &FrameSource) -> Sources {
     }
 }
 
-/// Returns the error of a log that does not fit a config: a topic of a wrong kind is shown with the
-/// line that names it.
+/// Returns the error for a log that does not fit a config. For a topic of the wrong kind it shows
+/// the line of the config that names it.
 pub fn refusal(error: LogError, config: &ResolvedConfig) -> Error {
     let (LogError::WrongTopic { key, .. } | LogError::UnknownTopic { key, .. }) = &error else {
         return error.into();
@@ -157,7 +157,7 @@ pub fn refusal(error: LogError, config: &ResolvedConfig) -> Error {
     }
 }
 
-/// Returns the topic of a source of obstacles.
+/// Returns the topic of an obstacle source.
 fn obstacle_topic(source: &SourceSettings) -> ObstacleTopic {
     ObstacleTopic {
         name: source.name.clone(),

@@ -7,23 +7,25 @@ use tagalong_sim::Truth;
 
 use crate::{Run, Trial};
 
-/// Conditions for the success of a crossing: P3, Table I, asks that both people are tracked in all
-/// frames, without saying how near a track must be. Here it is a place within half the width of the
-/// shoulders, by one and the same track.
+/// Conditions for the success of a crossing. P3, Table I, demands that both people are tracked in
+/// all frames, without stating the maximum distance of a track. Here, one and the same track must
+/// stay within half the shoulder width of each person.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crossing {
-    /// A newcomer must have a track after this time in view, s.
+    /// Time in view after which a newcomer must have a track, s.
     pub settle_s: f64,
-    /// Largest error of a head, m: half the shoulder width of a person 1.7 m tall (0.1295 of the
+    /// Maximum error of a head, m: half the shoulder width of a person 1.7 m tall (0.1295 of the
     /// height).
     pub max_error_m: f64,
-    /// Look at the error across the line of sight alone, as the papers do, whose
-    /// errors are pixels; otherwise at the distance on the floor.
+    /// If true, only the error across the line of sight counts, as in the papers, whose errors are
+    /// in pixels; otherwise the distance on the floor.
     pub across_only: bool,
-    /// A person counts while this fraction of the upper body is in the image, hidden or not.
+    /// A person counts while this fraction of the upper body is in the image, whether hidden or
+    /// not.
     pub min_in_image: f64,
-    /// Frames in which a smaller fraction of a person's upper body is visible do not count for that
-    /// person; 0 counts wholly hidden people, too, whose place can only be guessed.
+    /// Frames in which less than this fraction of a person's upper body is visible do not count for
+    /// that person; with 0 completely hidden people count as well, whose position can only be
+    /// guessed.
     pub min_visible: f64,
 }
 
@@ -39,14 +41,14 @@ impl Default for Crossing {
     }
 }
 
-/// A success.
+/// Result of a successful crossing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Span {
     /// Error of each head in each frame, m.
     pub errors_m: Vec<f64>,
 }
 
-/// Why a crossing is none.
+/// Reason why a crossing failed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Failing {
     /// A person was in view for `settle_s` without a track.
@@ -58,24 +60,25 @@ pub enum Failing {
     Lost {
         /// The person.
         person: u16,
-        /// When, s since the start.
+        /// Time of the loss, s since the start.
         at_s: f64,
     },
-    /// A person's track was elsewhere, possibly on another person.
+    /// A person's track was at another position, possibly on another person.
     Astray {
         /// The person.
         person: u16,
-        /// When, s since the start.
+        /// Time of the error, s since the start.
         at_s: f64,
     },
     /// No person was ever in view.
     Nobody,
 }
 
-/// Judges a crossing: every person in view must keep one track in all frames. Predicted tracks
+/// Evaluates a crossing: every person in view must keep one track in all frames. Predicted tracks
 /// count, because a hidden person can only be predicted.
 ///
-/// # Errors The first thing that went wrong, person by person.
+/// # Errors
+/// The first failure, person by person.
 pub fn crossing(trial: &Trial, run: &Run, rules: &Crossing) -> Result<Span, Failing> {
     let people: BTreeSet<u16> =
         trial.moments.iter().flat_map(|moment| &moment.truth).map(|truth| truth.id).collect();
@@ -87,7 +90,7 @@ pub fn crossing(trial: &Trial, run: &Run, rules: &Crossing) -> Result<Span, Fail
     if span.errors_m.is_empty() { Err(Failing::Nobody) } else { Ok(span) }
 }
 
-/// One person through all frames.
+/// Follows one person through all frames.
 fn follow(
     trial: &Trial,
     run: &Run,
@@ -106,18 +109,19 @@ fn follow(
         }) else {
             continue;
         };
-        // A frame that the pipeline skipped tells nothing about the tracks.
+        // A frame that the pipeline skipped contains no information about the tracks.
         if !report.outcome.is_processed() {
             continue;
         }
         let at_s = moment.stamp.nanos() as f64 / 1e9;
-        // Time to start a track counts from the first frame in view.
+        // The time to start a track counts from the first frame in view.
         let since = *in_view_since.get_or_insert(at_s);
         let mut confirmed = report.tracks.iter().filter(|track| track.confirmed);
         match own {
             None => {
                 own = confirmed
-                    // A track that belongs to another person cannot be found again as this one.
+                    // A track that belongs to another person cannot be the one that finds this
+                    // person again.
                     .filter(|t| !taken.contains(&t.id))
                     .filter(|t| rules.error_m(truth, t, &trial.camera) <= rules.max_error_m)
                     .map(|t| (apart_m(truth, t), t.id))
@@ -143,10 +147,10 @@ fn follow(
     Ok(())
 }
 
-/// Distance from which on a person in the same direction is another one, m.
+/// Distance from which on a person in the same direction must be another one, m.
 const SAME_M: f64 = 1.0;
 
-/// Distance on the floor.
+/// Returns the distance on the floor, m.
 fn apart_m(truth: &Truth, track: &Track) -> f64 {
     (track.estimate.person.position - truth.head_in_robot).xy().norm()
 }
@@ -156,7 +160,7 @@ impl Crossing {
         if !self.across_only {
             return apart_m(truth, track);
         }
-        // Errors along the line of sight, those of the depth, do not count.
+        // Errors along the line of sight, which are those of the depth, do not count.
         let off = (track.estimate.person.position - truth.head_in_robot).xy();
         let eye = camera.robot_from_camera.translation.vector;
         let sight = (truth.head_in_robot.coords - eye).xy();
@@ -165,7 +169,7 @@ impl Crossing {
     }
 }
 
-/// The fraction of the upper body that is in the image, hidden or not.
+/// Returns the fraction of the upper body that is in the image, whether hidden or not.
 pub(crate) fn in_image(truth: &Truth, camera: &Camera) -> f64 {
     let whole = camera.upper_body(&truth.head_in_robot);
     let inside = whole.clipped(camera.width, camera.height);

@@ -12,62 +12,62 @@ use tagalong_sim::{
 };
 use tagalong_vision::Unwrapping;
 
-/// Standard deviation of odometry as a fraction of the travel, as the log
-/// reader takes it where its `[input] odometry_sigma` is left out.
+/// Standard deviation of odometry as a fraction of the travel; the default of
+/// `[input] odometry_sigma` in the log reader.
 pub const ODOMETRY_SIGMA: f64 = 0.02;
-/// Images that come up to this many frames late are put in order, as the log
-/// reader does.
+/// Number of frames by which an image may be late and still be sorted in, as in the log reader.
 const REORDERED: usize = 3;
-/// Odometry is kept for this long before the oldest image that waits, ns: longer than any image is
-/// late.
+/// Time for which odometry is kept before the oldest waiting image, ns: longer than the delay of
+/// any image.
 const KEPT_NS: u64 = 1_000_000_000;
-/// Readings of each further sensor that are kept: those of some seconds.
+/// Number of readings of each further sensor that are kept, enough for a few seconds.
 const KEPT_READINGS: usize = 256;
 
-/// Input of a pipeline at one moment of a scene, and the truth at that moment.
+/// Input of a pipeline at one moment of a scene, with the truth at that moment.
 pub struct SimulatedFrame {
     /// The frame.
     pub frame: Frame,
-    /// Everybody.
+    /// All people.
     pub truth: Vec<Truth>,
-    /// The robot in the odometry frame, as it believes, m and rad.
+    /// Pose of the robot in the odometry frame, according to the odometry, m and rad.
     pub odom_from_robot: Isometry2<f64>,
-    /// The robot in the world, as it is, m and rad.
+    /// True pose of the robot in the world, m and rad.
     pub world_from_robot: Isometry2<f64>,
 }
 
-/// A scene as the frames of a log.
+/// Source of frames from a scene, equal to those of a recorded log.
 pub struct Draw {
     simulation: Simulation,
     camera: Arc<Camera>,
     unwrapping: Unwrapping,
     odometry: BTreeMap<u64, Isometry2<f64>>,
-    /// Images by their stamps, ns.
+    /// Waiting images by their stamps, ns.
     waiting: BTreeMap<u64, Shot>,
     patience: usize,
     previous: Option<(Stamp, Isometry2<f64>)>,
     calibration_changed: bool,
-    /// Readings of the further sensors by their names, the newest at the end.
+    /// Readings of the further sensors by name, the newest at the end.
     readings: BTreeMap<Arc<str>, VecDeque<SensorReading>>,
     index: u64,
 }
 
-/// Pose of the robot by the odometry.
+/// Pose of the robot according to the odometry.
 #[derive(Clone, Copy)]
 struct KnownPose {
     odom_from_robot: Isometry2<f64>,
-    /// Age of the odometry, s; infinite without any.
+    /// Age of the odometry, s; infinite without odometry.
     age_s: f64,
 }
 
 impl Draw {
-    /// Frames in the order of their stamps, as out of a log; `threads` draw.
+    /// Returns frames in the order of their stamps, as from a log; `threads` is the number of
+    /// threads that render.
     pub fn new(scene: &Scene, threads: usize) -> Self {
         Self::with_patience(scene, threads, REORDERED)
     }
 
-    /// Frames in the order in which they arrive, as on a robot, which may be
-    /// steered between them.
+    /// Returns frames in the order in which they arrive, as on a robot, which may be steered
+    /// between them.
     pub fn live(scene: &Scene, threads: usize) -> Self {
         Self::with_patience(scene, threads, 0)
     }
@@ -93,23 +93,23 @@ impl Draw {
         self.simulation.steer(command);
     }
 
-    /// The camera of all frames, as the pipelines believe it to be.
+    /// Returns the camera of all frames, as the pipelines know it.
     pub fn camera(&self) -> &Camera {
         &self.camera
     }
 
-    /// The scene in motion.
+    /// Returns the running simulation.
     pub fn simulation(&self) -> &Simulation {
         &self.simulation
     }
 
-    /// The next frame; `None` at the end of the scene.
+    /// Returns the next frame; `None` at the end of the scene.
     pub fn next_frame(&mut self) -> Option<SimulatedFrame> {
         self.next_frame_while(|_, _| None)
     }
 
-    /// Returns the next frame, with a caller at the wheels until it comes: `at_wheels` receives all
-    /// events, and may command them.
+    /// Returns the next frame, while a caller may steer until it arrives: `at_wheels` receives all
+    /// events, and may command the wheels.
     pub fn next_frame_while(
         &mut self,
         mut at_wheels: impl FnMut(&Simulation, &Event) -> Option<WheelSpeeds>,
@@ -131,7 +131,7 @@ impl Draw {
         Some(self.simulated(shot))
     }
 
-    /// Takes in a pose; one that is no number is refused, as log readers do.
+    /// Adds a pose, unless it is not finite, as log readers do.
     fn hear(&mut self, reading: &OdometryReading) {
         let pose = reading.odom_from_robot;
         if pose.translation.vector.iter().any(|metres| !metres.is_finite()) {
@@ -141,17 +141,17 @@ impl Draw {
         self.forget_odometry(self.simulation.robot_clock_ns(reading.at_ns));
     }
 
-    /// Drops odometry that is older than any image to come, except the newest of it: at few images a
-    /// second those that wait to be put in order are old themselves.
+    /// Drops odometry that is older than any image to come, except for the newest such reading: at
+    /// low frame rates the images that wait to be sorted are old themselves.
     fn forget_odometry(&mut self, now_ns: u64) {
         let oldest_ns = self.waiting.keys().next().map_or(now_ns, |waits| now_ns.min(*waits));
         let least_ns = oldest_ns.saturating_sub(KEPT_NS);
-        // Odometry that fell silent is old, but all that is known.
+        // If the odometry is silent, the old reading is all that is known.
         let last_before = self.odometry.range(..least_ns).next_back().map(|(at_ns, _)| *at_ns);
         self.odometry = self.odometry.split_off(&last_before.unwrap_or(least_ns));
     }
 
-    /// Takes in a reading of a further sensor.
+    /// Adds a reading of a further sensor.
     fn feel(&mut self, reading: SensorReading) {
         let readings = self.readings.entry(Arc::clone(&reading.name)).or_default();
         readings.push_back(reading);
@@ -160,13 +160,13 @@ impl Draw {
         }
     }
 
-    /// Returns the newest reading of each further sensor, in the robot frame at a time; `None`
-    /// without such sensors.
+    /// Returns the newest reading of each further sensor, in the robot frame at a given time;
+    /// `None` without such sensors.
     fn obstacle_readings(&self, stamp_ns: u64, here: &Isometry2<f64>) -> Option<ObstacleReadings> {
         let is_live = self.patience == 0;
         let mut newest = Vec::new();
         for (name, readings) in &self.readings {
-            // On a robot a bumper that was pressed after a late image counts, too.
+            // On a robot, a bumper that was pressed after a late image counts as well.
             let known = readings.iter().rev().find(|of| is_live || of.stamp_ns <= stamp_ns);
             let Some(reading) = known else { continue };
             let then = self.known_pose(reading.stamp_ns).odom_from_robot;
@@ -180,7 +180,7 @@ impl Draw {
         (!newest.is_empty()).then(|| ObstacleReadings(newest.into()))
     }
 
-    /// Returns the pose by the newest odometry that is not from the future of a stamp.
+    /// Returns the pose from the newest odometry that is not later than a stamp.
     fn known_pose(&self, stamp_ns: u64) -> KnownPose {
         let newest = self.odometry.range(..=stamp_ns).next_back();
         newest.map_or(
@@ -195,13 +195,14 @@ impl Draw {
     fn simulated(&mut self, shot: Shot) -> SimulatedFrame {
         self.index += 1;
         let stamp = Stamp::from_nanos(shot.stamp_ns);
-        // The odometry speaks at every step of the simulation, so at this one.
+        // The odometry publishes at every step of the simulation, including this one.
         let pose = self.known_pose(shot.stamp_ns);
         let motion = self.motion(stamp, pose);
         let camera = Arc::clone(&self.camera);
         let scan = self.simulation.laser().zip(shot.laser.as_deref());
         let laser = scan.map(|(laser, ranges)| laser.scan(ranges).with_stamp(stamp));
-        // As log readers: the first calibration stays, and a change is never taken back.
+        // As in log readers, the first calibration is used throughout, and a change is never taken
+        // back.
         self.calibration_changed |= *shot.camera != *self.simulation.camera();
         let readings = self.obstacle_readings(shot.stamp_ns, &pose.odom_from_robot);
         let mut frame = Frame::new(self.index, stamp, camera, motion, self.as_logged(shot.images))
@@ -223,26 +224,26 @@ impl Draw {
         }
     }
 
-    /// Returns the time from the stamp of an image to its arrival, s, on a robot; a log has none.
+    /// Returns the time from the stamp of an image to its arrival on a robot, s; a log has none.
     fn latency_s(&self, stamp_ns: u64, arrived_ns: u64) -> Option<f64> {
         let is_live = self.patience == 0;
         is_live.then_some((arrived_ns as f64 - stamp_ns as f64) * 1e-9)
     }
 
-    /// Converts images as a log does: depth is stored in millimetres, and log readers unwrap
-    /// circles. The panorama of a simulation fits its images, so nothing is ever left wrapped.
+    /// Converts images as a log does: depth is stored in millimetres, and circular images are
+    /// unwrapped. The panorama of a simulation fits its images, so the unwrapping cannot fail.
     fn as_logged(&mut self, images: Images) -> Images {
         if let Some(panorama) = self.camera.panorama() {
             return self.unwrapping.apply(panorama, &images).unwrap_or(images);
         }
-        // Recorded depth has whole millimetres.
+        // Recorded depth is in whole millimetres.
         fn round(depth: Arc<DepthImage>) -> Arc<DepthImage> {
             Arc::new(depth.map(|z| (1000.0 * z).round() * 0.001))
         }
         Images { depth: images.depth.map(round), ..images }
     }
 
-    /// From the frame before; none to a frame that is older than that.
+    /// Returns the motion since the previous frame; none for a frame that is older than that one.
     fn motion(&mut self, stamp: Stamp, here: KnownPose) -> EgoMotion {
         // An image that is older than the last one has no motion since then.
         let before = self.previous.filter(|(then, _)| *then < stamp);
@@ -258,7 +259,7 @@ impl Draw {
     }
 }
 
-/// Returns data of a further sensor in the robot frame of another moment.
+/// Returns the data of a further sensor, transformed to the robot frame of another moment.
 fn moved_along(data: &SensorData, now_from_then: &Isometry3<f64>) -> ObstacleData {
     match data {
         SensorData::Scan { scanner, ranges } => {
@@ -273,8 +274,8 @@ fn moved_along(data: &SensorData, now_from_then: &Isometry3<f64>) -> ObstacleDat
     }
 }
 
-/// The camera of the frames: that of the log, with the circular image of a
-/// mirror unwrapped.
+/// Returns the camera of the frames: that of the log, with the circular image of a mirror
+/// unwrapped.
 fn seen_by(simulation: &Simulation) -> Camera {
     let camera = simulation.camera().clone();
     match simulation.panorama() {

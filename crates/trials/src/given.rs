@@ -1,8 +1,7 @@
 //! Given boxes: sequences of the MOTChallenge, tracked in memory and without images.
 //!
-//! Association alone is compared where every tracker gets the very same boxes. A sequence needs its
-//! truth and the boxes of any detector; the images stay where they are, because nothing here looks
-//! at them.
+//! To compare association alone, every tracker gets exactly the same boxes. A sequence needs its
+//! truth and the boxes of any detector; the images are not used.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -23,7 +22,7 @@ use tagalong_pipeline::FrameReport;
 
 use crate::{Contender, TrialError};
 
-/// A sequence: its annotated people, and the given boxes.
+/// A sequence with its annotated people and the given boxes.
 pub struct GivenSequence {
     /// Name, length and rate.
     pub info: SequenceInfo,
@@ -40,18 +39,18 @@ impl fmt::Debug for GivenSequence {
 /// Tracks of a sequence.
 #[derive(Clone, Debug, Default)]
 pub struct GivenTracks {
-    /// Confirmed tracks that a box of the frame supports; coasting ones do not count.
+    /// Confirmed tracks that are matched with a box of the frame; coasting ones do not count.
     pub reports: Vec<(u32, Report)>,
     /// Processor time of all steps, ms.
     pub worked_ms: f64,
 }
 
 impl GivenSequence {
-    /// Reads a sequence from its folder with `seqinfo.ini` and `gt/gt.txt`, and its boxes from a
-    /// file in the form of `det.txt`.
+    /// Reads a sequence from its folder, which contains `seqinfo.ini` and `gt/gt.txt`, and its
+    /// boxes from a file in the format of `det.txt`.
     ///
     /// # Errors
-    /// [`TrialError::Given`] for a file that is missing or wrong.
+    /// [`TrialError::Given`] for a missing or invalid file.
     pub fn read(folder: &Path, boxes: &Path) -> Result<Self, TrialError> {
         let (path, info) = text(folder, "seqinfo.ini")?;
         let info = parse_info(&info, &path).map_err(given)?;
@@ -63,12 +62,12 @@ impl GivenSequence {
         Ok(Self { info, truths: truths.iter().map(|row| row.truth(rules)).collect(), frames })
     }
 
-    /// Reads all sequences of a folder, in the order of their names. The boxes of `NAME` are
-    /// `BOXES/NAME/det.txt` or `BOXES/NAME.txt`, and without a folder of boxes `NAME/det/det.txt`
+    /// Reads all sequences of a folder, sorted by name. The boxes of `NAME` are in
+    /// `BOXES/NAME/det.txt` or `BOXES/NAME.txt`, or without a folder of boxes in `NAME/det/det.txt`
     /// beside the truth.
     ///
     /// # Errors
-    /// A folder without sequences, or a file that is missing or wrong.
+    /// A folder without sequences, or a missing or invalid file.
     pub fn read_all(folder: &Path, boxes: Option<&Path>) -> Result<Vec<Self>, TrialError> {
         let shown = folder.display();
         let entries =
@@ -82,17 +81,17 @@ impl GivenSequence {
         folders.iter().map(|folder| Self::read(folder, &boxes_of(folder, boxes))).collect()
     }
 
-    /// Keeps the first of the people of the truth with the same ID in a frame; returns the number of those
-    /// left out.
+    /// Keeps the first of several people with the same ID in a frame of the truth; returns the
+    /// number of those that are removed.
     pub fn drop_doubled_ids(&mut self) -> usize {
         keep_first_of_id(&mut self.truths, |(frame, truth)| (u64::from(*frame), truth.id))
     }
 
     /// Tracks the boxes with a contender. Its detector gets them with the frames, as whole bodies,
-    /// whatever its config says of files.
+    /// even if its config names files.
     ///
     /// # Errors
-    /// A config that is wrong, and plugins that fail.
+    /// An invalid config, or a plugin that fails.
     pub fn track(
         &self,
         contender: &Contender,
@@ -101,7 +100,7 @@ impl GivenSequence {
         let mut pipeline = contender.pipeline(registry, 1)?;
         let mut tracks = GivenTracks::default();
         for frame in &self.frames {
-            // Time of this thread alone, so that other load on the machine does not count.
+            // Only the time of this thread, so that other load on the machine does not count.
             let before = ThreadTime::now();
             let report = pipeline.step(frame).map_err(|error| TrialError::Step {
                 pipeline: contender.name.clone(),
@@ -114,7 +113,7 @@ impl GivenSequence {
         Ok(tracks)
     }
 
-    /// Scores tracks by the rules of the sequence's truth, IoU 0.5 where a threshold is needed.
+    /// Scores tracks by the rules of the sequence's truth, with IoU 0.5 as the threshold.
     ///
     /// # Errors
     /// Tracks that cannot be scored.
@@ -124,7 +123,7 @@ impl GivenSequence {
         Ok(Tally::measure(&sequence, &comparison, &SetDistance::default())?)
     }
 
-    /// Returns the number of its frames.
+    /// Returns the number of frames.
     pub fn len(&self) -> usize {
         self.frames.len()
     }
@@ -146,11 +145,11 @@ impl GivenSequence {
 }
 
 impl GivenTracks {
-    /// Formats the tracks as a file of results of the MOTChallenge.
+    /// Formats the tracks as a result file of the MOTChallenge.
     pub fn text(&self) -> String {
         let mut out = Vec::new();
         for (frame, report) in &self.reports {
-            // Writing to memory does not fail.
+            // Writing to memory cannot fail.
             write_report(&mut out, *frame, report).unwrap_or_default();
         }
         String::from_utf8(out).unwrap_or_default()
@@ -172,7 +171,7 @@ impl GivenTracks {
 /// setting.
 ///
 /// # Errors
-/// A config without a detector that takes recorded detections.
+/// A config without a detector for recorded detections.
 pub fn for_given_boxes(resolved: &str, registry: &Registry) -> Result<String, TrialError> {
     let mut root: toml::Table = resolved.parse().map_err(given)?;
     let detectors = root.get_mut("detectors").and_then(toml::Value::as_array_mut);
@@ -206,7 +205,7 @@ fn boxes_of(folder: &Path, boxes: Option<&Path>) -> PathBuf {
     boxes.join(format!("{}.txt", name.to_string_lossy()))
 }
 
-/// Returns the path of a file as messages show it, and its text.
+/// Returns the path of a file as it is shown in messages, and its text.
 fn text(folder: &Path, name: &str) -> Result<(String, String), TrialError> {
     let path = if name.is_empty() { folder.to_owned() } else { folder.join(name) };
     let shown = path.display().to_string();
@@ -229,8 +228,8 @@ fn given_boxes(
     Ok(boxes)
 }
 
-/// Returns frames with a stamp each and without images, and a camera with the size of the images (a
-/// field of view of 53 degrees, at breast height).
+/// Returns frames that have a stamp each but no images, and a camera with the size of the images (a
+/// field of view of 53 degrees, at chest height).
 fn frames(info: &SequenceInfo, mut boxes: BTreeMap<u32, Vec<ExternalDetection>>) -> Vec<Frame> {
     let width = info.width as usize;
     let height = info.height as usize;

@@ -9,14 +9,14 @@ use tagalong_pipeline::FrameReport;
 
 use crate::{Moment, Run, Trial, TrialError};
 
-/// People that count, and the comparison.
+/// Rules for scoring: the people that count, and the comparison.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Judge {
-    /// Places on the floor, or boxes in the image.
+    /// Measure of similarity: by positions on the floor, or by boxes in the image.
     pub similarity: Similarity,
-    /// Distance from which on a person is neither a miss nor a false alarm, m.
+    /// Distance beyond which a person is neither a miss nor a false positive, m.
     pub max_range_m: f64,
-    /// Tracks that are predicted only count as reports, too.
+    /// If true, tracks that are only predicted count as reports as well.
     pub coasting: bool,
 }
 
@@ -26,27 +26,27 @@ impl Default for Judge {
     }
 }
 
-/// Result of a contender on a scene.
+/// Scores of a contender on a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Judged {
-    /// All counts; tallies of several trials add up by [`Tally::combine`].
+    /// All counts; those of several trials are combined by [`Tally::combine`].
     pub tally: Tally,
-    /// Errors of the matched places in the robot frame, m.
+    /// Errors of the matched positions in the robot frame, m.
     pub errors_in_robot_m: Vec<f64>,
-    /// The same in the frame of the robot at the start, which adds the drift
-    /// of the odometry that the pipeline believed, m.
+    /// The same errors in the frame of the robot at the start, which includes the drift of the
+    /// odometry that the pipeline used, m.
     pub errors_in_start_m: Vec<f64>,
 }
 
 impl Judge {
-    /// Judges one contender.
+    /// Scores one contender.
     ///
     /// # Errors
     /// Tracks that cannot be scored.
     pub fn judge(&self, trial: &Trial, run: &Run) -> Result<Judged, TrialError> {
         let moments = processed(trial, run);
         let sequence = self.sequence(trial, &moments);
-        // The same defaults as `eval`, so that trials and logs are comparable.
+        // The same defaults as in `eval`, so that trials and logs are comparable.
         let comparison = Comparison::from(self.similarity);
         let tally = Tally::measure(&sequence, &comparison, &SetDistance::default())?;
         let prepared = Prepared::new(&sequence, &comparison)?;
@@ -61,7 +61,7 @@ impl Judge {
         Sequence { name: format!("seed {}", trial.seed), frames: frames.collect() }
     }
 
-    /// Returns the frame; where places are compared, frames without a place do not count.
+    /// Returns the frame. If positions are compared, frames without a position do not count.
     fn frame(&self, trial: &Trial, moment: &Moment, report: &FrameReport) -> Frame {
         let by_box = self.similarity == Similarity::Iou;
         let truths = moment.truth.iter().map(|person| self.truth(person, &trial.camera));
@@ -73,7 +73,7 @@ impl Judge {
         }
     }
 
-    /// Returns the reports that count of a pipeline's report on a frame, of an image with so many
+    /// Returns the reports that count in a pipeline's report on a frame, for an image of this many
     /// columns and rows.
     pub fn reports(&self, report: &FrameReport, size: (usize, usize)) -> Vec<Report> {
         let by_box = self.similarity == Similarity::Iou;
@@ -85,7 +85,7 @@ impl Judge {
     fn truth(&self, person: &tagalong_sim::Truth, camera: &Camera) -> Truth {
         let head = person.head_in_robot;
         let in_camera = camera.robot_from_camera.inverse_transform_point(&head);
-        // Beyond the range both the person and reports on it are left out.
+        // Beyond the range both the person and the reports on it are left out.
         let far = head.x.hypot(head.y) > self.max_range_m;
         Truth {
             id: i64::from(person.id),
@@ -100,7 +100,7 @@ impl Judge {
     }
 }
 
-/// Frames that left a trace in the pipeline.
+/// Returns the frames that the pipeline processed.
 fn processed<'a>(trial: &'a Trial, run: &'a Run) -> Vec<(&'a Moment, &'a FrameReport)> {
     let all = trial.moments.iter().zip(&run.reports);
     all.filter(|(_, report)| report.outcome.is_processed()).collect()
@@ -121,8 +121,8 @@ fn region(rect: &Rect) -> Region {
     Region::new(rect.x, rect.y, rect.width, rect.height)
 }
 
-/// Returns the errors of the matches. In the frame of the start the truth follows the robot's real
-/// way, the report the ego-motion that the pipeline estimated.
+/// Returns the errors of the matches. In the frame of the start, the truth uses the robot's real
+/// motion, and the report the ego-motion that the pipeline estimated.
 fn errors_m(
     moments: &[(&Moment, &FrameReport)],
     sequence: &Sequence,

@@ -1,28 +1,28 @@
 //! Trials of pipelines on simulated scenes, in memory: render once, run many.
 //!
-//! A published figure comes from a dozen recordings that are not available. Its fair counterpart is
-//! the same layout simulated again and again, with other people, other furniture and other luck,
-//! until the interval around the figure is narrow enough to say something. [`each`] does that: it
-//! renders every scene of a list, takes all contenders over the very same frames, and hands each
-//! [`Trial`] to a function that keeps the parts that it needs, so that memory stays flat over
+//! A published figure comes from a dozen recordings that are not available. A fair substitute is to
+//! simulate the same layout repeatedly, with other people, other furniture and other random
+//! numbers, until the interval around the figure is narrow enough. [`each`] does that: it renders
+//! every scene of a list, runs all contenders on exactly the same frames, and passes each [`Trial`]
+//! to a function that keeps only the parts that it needs, so that memory stays constant over
 //! thousands of trials.
 //!
-//! [`Draw`] makes the frames that the log reader would make of the recorded scene: the camera as
+//! [`Draw`] makes the frames that the log reader would make from the recorded scene: the camera as
 //! the log describes it, not as it is mounted; the robot's motion from its odometry, not from the
-//! truth; images that came late, in order. Only the JPEG compression of colour images is left out.
+//! truth; late images in order. Only the JPEG compression of colour images is left out.
 //!
-//! A trial is judged by [`Judge`] (the metrics of `tagalong-eval`, and position errors in two
+//! A trial is scored by [`Judge`] (the metrics of `tagalong-eval`, and position errors in two
 //! frames), [`crossing`] (are all people tracked in all frames?) and [`occlusions`] (is a person
-//! re-identified after it?).
+//! re-identified afterwards?).
 //!
-//! A [`Ride`] closes the loop: the contender drives the robot, and a [`RideJudge`] measures how
-//! well it stayed with the person. Where a person or a trolley comes at the robot, an
-//! [`ApproachJudge`] says whether the robot moved when they touched.
+//! A [`Ride`] closes the loop: the contender steers the robot, and a [`RideJudge`] measures how
+//! well it stayed with the person. If a person or a trolley moves towards the robot, an
+//! [`ApproachJudge`] determines whether the robot was moving at the contact.
 //!
-//! A [`GivenSequence`] needs no scene: the boxes of another detector on a recorded sequence, for
-//! comparisons of associations and filters alone.
+//! A [`GivenSequence`] needs no scene: it contains the boxes of another detector on a recorded
+//! sequence, for comparisons of association and filters alone.
 //!
-//! The result of a list of scenes depends on the scenes and configs alone, not on the number of
+//! The result of a list of scenes depends only on the scenes and configs, not on the number of
 //! threads.
 //!
 //! ```

@@ -5,14 +5,14 @@ use tagalong_sim::Truth;
 use crate::crossing::in_image;
 use crate::{Run, Trial};
 
-/// Less than this seen is hidden.
+/// Visible fraction below which a person is hidden.
 const HIDDEN: f64 = 0.2;
-/// More than this seen is in view again.
+/// Visible fraction above which a person is in view again.
 const VISIBLE: f64 = 0.5;
-/// A track this near to a person is theirs, m.
+/// Maximum distance between a track and its person, m.
 const NEAR_M: f64 = 0.5;
-/// Longest time before the occlusion in which a track of the person is looked for, and after it
-/// until they must be found again, s.
+/// Maximum time before the occlusion in which the track of the person is looked for, and after it
+/// until the person must be found again, s.
 const PATIENCE_S: f64 = 1.5;
 
 /// Time during which a person was hidden behind another one.
@@ -24,30 +24,30 @@ pub struct Occlusion {
     pub behind: u16,
     /// Index of the first hidden moment.
     pub first: usize,
-    /// Index of the moment in which they are in view again.
+    /// Index of the moment in which the person is in view again.
     pub again: usize,
-    /// Time in between, s.
+    /// Time between the two, s.
     pub duration_s: f64,
-    /// Distance of the two in the middle of it, m.
+    /// Distance between the two people in the middle of that time, m.
     pub gap_m: f64,
 }
 
-/// Result of a contender in an occlusion.
+/// Result of a contender for an occlusion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Outcome {
-    /// The same track goes on.
+    /// The same track continues.
     Kept,
-    /// Found again under a new number.
+    /// The person was found again with a new ID.
     Renamed,
-    /// Found again under the number of another person.
+    /// The person was found again with the ID of another person.
     Swapped,
-    /// Not found again in time.
+    /// The person was not found again in time.
     Lost,
-    /// Had no track before: says nothing of the occlusion.
+    /// The person had no track before, so the occlusion cannot be scored.
     Untracked,
 }
 
-/// All occlusions of a scene that end within it, in the order of people and time.
+/// Returns all occlusions of a scene that end within it, sorted by person and time.
 pub fn occlusions(trial: &Trial) -> Vec<Occlusion> {
     let mut people: Vec<u16> =
         trial.moments.iter().flat_map(|m| &m.truth).map(|truth| truth.id).collect();
@@ -99,7 +99,7 @@ fn occlusion(
     })
 }
 
-/// Returns the fate of the person's track.
+/// Returns what happened to the person's track.
 pub fn outcome(trial: &Trial, run: &Run, occlusion: &Occlusion) -> Outcome {
     let Occlusion { person, first, again, .. } = *occlusion;
     let mut earlier = (0..first).rev().take_while(|index| are_close(trial, first, *index));
@@ -114,7 +114,7 @@ pub fn outcome(trial: &Trial, run: &Run, occlusion: &Occlusion) -> Outcome {
     }
 }
 
-/// Whether two moments are so close that a track of the one counts at the other.
+/// Returns true if two moments are so close that a track at one of them counts at the other.
 fn are_close(trial: &Trial, from: usize, index: usize) -> bool {
     let a = trial.moments[from].stamp;
     let b = trial.moments[index].stamp;
@@ -125,8 +125,8 @@ fn existed(reports: &[FrameReport], id: TrackId) -> bool {
     reports.iter().flat_map(|report| &report.tracks).any(|track| track.confirmed && track.id == id)
 }
 
-/// Returns the confirmed, observed track that is nearest to a person, if it is near enough and no
-/// other person is nearer to it.
+/// Returns the confirmed track, observed in this frame, that is nearest to a person, if it is near
+/// enough and not nearer to another person.
 fn track_at(trial: &Trial, report: &FrameReport, index: usize, person: u16) -> Option<TrackId> {
     fn distance(truth: &Truth, track: &tagalong_core::Track) -> f64 {
         (track.estimate.person.position - truth.head_in_robot).xy().norm()

@@ -5,11 +5,12 @@ use tagalong_sim::Scene;
 
 use crate::{Contender, Trial, TrialError};
 
-/// Renders all scenes, runs all contenders on each, and keeps the results of `keep` on the trials,
-/// in the order of the scenes. `threads` trials run at a time; `done` receives after each the
-/// number of finished ones.
+/// Renders all scenes, runs all contenders on each, and returns the results of `keep` for the
+/// trials, in the order of the scenes. `threads` trials run at a time; `done` is called after each
+/// with the number of finished ones.
 ///
-/// # Errors The error of the first scene, in the order of the list, that has one.
+/// # Errors
+/// The error of the first scene in the list that has one.
 pub fn each<T: Send>(
     scenes: &[Scene],
     contenders: &[Contender],
@@ -26,10 +27,11 @@ pub fn each<T: Send>(
     )
 }
 
-/// Returns the results of `work` on each thing, in the order of the things, `threads` at a time;
-/// `done` receives after each the number of finished ones.
+/// Returns the results of `work` for each item, in the order of the items, `threads` at a time;
+/// `done` is called after each with the number of finished ones.
 ///
-/// # Errors The error of the first thing, in the order of the list, that has one.
+/// # Errors
+/// The error of the first item in the list that has one.
 pub fn in_order<S: Sync, T: Send>(
     things: &[S],
     threads: usize,
@@ -42,7 +44,7 @@ pub fn in_order<S: Sync, T: Send>(
         let mut others = Vec::new();
         for _ in 1..threads {
             let start = std::thread::Builder::new();
-            // Without another thread, those that run do its work.
+            // If a thread cannot be started, the running ones do its work.
             others.extend(
                 start
                     .spawn_scoped(scope, || work_off(things, [&next, &through], &work, &done))
@@ -59,7 +61,7 @@ pub fn in_order<S: Sync, T: Send>(
     all.into_iter().map(|(_, result)| result).collect()
 }
 
-/// Does the next thing until there is none, and returns the results with the places of the things.
+/// Processes items until none is left, and returns the results with the indices of the items.
 fn work_off<S, T>(
     things: &[S],
     [next, through]: [&AtomicUsize; 2],
@@ -73,7 +75,7 @@ fn work_off<S, T>(
         kept.push((at, result));
         done(through.fetch_add(1, Ordering::Relaxed) + 1);
         if failed {
-            // The others need not go on.
+            // The other threads need not continue.
             next.store(things.len(), Ordering::Relaxed);
         }
     }

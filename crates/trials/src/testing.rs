@@ -1,4 +1,4 @@
-//! Trials written by hand.
+//! Trials written by hand, for tests.
 
 use nalgebra::{Isometry2, Point3, SMatrix, Vector2};
 use tagalong_core::{Estimate, Person, Stamp, Track, TrackId};
@@ -11,20 +11,21 @@ use crate::{Moment, Run, Trial};
 /// Frames per second.
 pub const RATE_HZ: f64 = 10.0;
 
-/// Place of a person, and their visible fraction.
+/// Position of a person, and the visible fraction.
 pub type HeadSample = (f64, f64, f64);
 
-/// Where a track is on the floor in a frame, if it is there, m.
+/// Position of a track on the floor in a frame, m; `None` if it is absent.
 pub type FloorPosition = Option<(f64, f64)>;
 
-/// A track's number, and where it is in every frame.
+/// ID of a track, and its position in every frame.
 pub type Path<'a> = (u32, &'a [FloorPosition]);
 
 fn camera() -> Camera {
     Camera::mounted(Pinhole::centred(300.0, 320, 240), 320, 240, 1.2, 0.0, 0.0)
 }
 
-/// A robot at rest, and for each person and each track a place in every frame.
+/// Returns a trial with a robot at rest, and with a position in every frame for each person and
+/// each track.
 pub fn trial(people: &[&[HeadSample]], tracks: &[Path<'_>]) -> Trial {
     let frames = people[0].len();
     let camera = camera();

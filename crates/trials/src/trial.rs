@@ -10,14 +10,14 @@ use tagalong_stereo::{StereoDepth, StereoSettings};
 
 use crate::{Contender, Draw, SimulatedFrame};
 
-/// Why a trial has no result.
+/// Reason why a trial has no result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TrialError {
-    /// A config that is wrong, shown with the place of the mistake.
+    /// An invalid config, shown with the position of the mistake.
     #[error("{0}")]
     Config(String),
-    /// A plugin refused a frame, or panicked on it.
+    /// A plugin rejected a frame, or panicked on it.
     #[error("{pipeline}, seed {seed}: {error}")]
     Step {
         /// The contender.
@@ -33,13 +33,13 @@ pub enum TrialError {
     /// Tracks that cannot be scored.
     #[error(transparent)]
     Eval(#[from] EvalError),
-    /// The observer could not write the ride down.
+    /// The observer could not write the ride.
     #[error("{0}")]
     Witness(String),
     /// A sequence with given boxes that cannot be read.
     #[error("{0}")]
     Given(String),
-    /// A thread that works on trials died.
+    /// A worker thread died.
     #[error("a trial panicked; please report this")]
     Panicked,
 }
@@ -49,11 +49,11 @@ pub enum TrialError {
 pub struct Moment {
     /// Stamp of the frame.
     pub stamp: Stamp,
-    /// Everybody.
+    /// All people.
     pub truth: Vec<Truth>,
-    /// The robot in the odometry frame, as it believes, m and rad.
+    /// Pose of the robot in the odometry frame, according to the odometry, m and rad.
     pub odom_from_robot: Isometry2<f64>,
-    /// The robot in the world, as it is, m and rad.
+    /// True pose of the robot in the world, m and rad.
     pub world_from_robot: Isometry2<f64>,
 }
 
@@ -62,9 +62,9 @@ pub struct Moment {
 pub struct Run {
     /// Name of the contender.
     pub pipeline: String,
-    /// One report a frame, in the order of [`Trial::moments`].
+    /// One report per frame, in the order of [`Trial::moments`].
     pub reports: Vec<FrameReport>,
-    /// Time that a processor worked on them, drawing not included, ms.
+    /// Processor time for them, without rendering, ms.
     pub worked_ms: f64,
 }
 
@@ -73,9 +73,9 @@ pub struct Run {
 pub struct Trial {
     /// Seed of the scene.
     pub seed: u64,
-    /// The camera, as the pipelines believe it to be.
+    /// The camera, as the pipelines know it.
     pub camera: Camera,
-    /// Furniture; places are in the world.
+    /// Furniture; positions are in the world.
     pub furniture: Vec<Furniture>,
     /// The frames.
     pub moments: Vec<Moment>,
@@ -84,10 +84,10 @@ pub struct Trial {
 }
 
 impl Trial {
-    /// Draws a scene and takes each contender over the same frames.
+    /// Renders a scene and runs each contender on the same frames.
     ///
     /// # Errors
-    /// A config that is wrong, or a plugin that fails.
+    /// An invalid config, or a plugin that fails.
     pub fn new(
         scene: &Scene,
         contenders: &[Contender],
@@ -97,8 +97,8 @@ impl Trial {
         Self::prepared(scene, contenders, registry, threads, Ok)
     }
 
-    /// As [`Trial::new`], with depth from a scene's stereo pairs that is computed once
-    /// for all contenders: their own `[stereo]` stages have nothing to do.
+    /// Does the same as [`Trial::new`], with depth from a scene's stereo pairs, computed once for
+    /// all contenders: their own `[stereo]` stages then have nothing to do.
     ///
     /// # Errors
     /// Also [`TrialError::Config`] for settings that cannot work, and
@@ -143,8 +143,8 @@ impl Trial {
     }
 }
 
-/// Returns the scene without colour images where no pipeline uses them: they take more than half of the
-/// time of an image with depth, and change nothing else.
+/// Returns the scene without colour images if no pipeline uses them: they take more than half of
+/// the time of an image with depth, and affect nothing else.
 pub(crate) fn without_unused_colour(scene: &Scene, inputs: Inputs, are_images_used: bool) -> Scene {
     let mut scene = scene.clone();
     let camera = &mut scene.camera;
@@ -162,7 +162,7 @@ impl Moment {
     }
 }
 
-/// A pipeline on its way through the frames.
+/// A pipeline while it processes the frames.
 struct Lane {
     pipeline: Pipeline,
     seed: u64,

@@ -175,7 +175,7 @@ fn check_same_log(runs: &[Recording]) -> Result<(), Failure> {
         return Ok(());
     }
     Err(Failure::usage(format!(
-        "the runs are of different logs, {} and {}; two runs are compared frame by frame, so run \
+        "the runs are of different logs, {} and {}, but two runs are compared frame by frame: run \
          both pipelines on one log",
         one.report.log.name, other.report.log.name
     )))

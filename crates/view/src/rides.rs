@@ -136,8 +136,8 @@ impl Ride {
         name.ok_or_else(|| {
             let shown = parent.join(RESULTS).display().to_string();
             Failure::usage(format!(
-                "{shown} names no folder for the ride of {} with seed {}: an earlier version made it; \
-                 repeat it with `tagalong follow ... -o FOLDER --overwrite`",
+                "{shown} names no folder for the ride of {} with seed {}, because an earlier \
+                 version made it; repeat it with `tagalong follow ... -o FOLDER --overwrite`",
                 self.suite, self.facts.seed
             ))
         })
@@ -186,9 +186,9 @@ fn list(folder: &Path, from: Option<&Path>, rides: &[Ride]) -> String {
             }
             (table(rides, from))
             p class="soft" {
-                "Distance kept: share of the time near the stand-off, of that in which the person was followed and "
-                "walked slowly. Person kept: followed to the end or rightly given up, and nobody else for long. "
-                "Wrong person: time in which another person or a thing was followed. In view: share of the time in "
+                "Distance kept: share of the time near the stand-off while the person was followed and "
+                "walked slowly. Person kept: followed to the end or rightly given up, and no other person followed for long. "
+                "Wrong person: time in which another person or an object was followed. In view: share of the time in "
                 "which the camera saw the person."
             }
         }

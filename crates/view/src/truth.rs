@@ -205,8 +205,9 @@ fn described(event: &Event) -> Option<EventData> {
             ("switched", Some(person), Some(to), text)
         }
         EventKind::WrongPerson { track, began_with, person } => {
-            let text =
-                format!("track {track} began on annotated person {began_with}, is on {person}");
+            let text = format!(
+                "track {track}, which began on annotated person {began_with}, is now on {person}"
+            );
             ("wrong person", Some(person), Some(track), text)
         }
         EventKind::FalseTrack { track } => {

@@ -1,11 +1,12 @@
-//! Makes detections of boxes of whole people, as a network gives them, by the depth within them.
+//! Turns boxes of whole people, as a network returns them, into detections, using the depth within
+//! them.
 #![allow(clippy::print_stdout, reason = "an example prints what it finds")]
 
 use tagalong_core::{Detection, Frame, Query};
 use tagalong_geometry::Rect;
 use tagalong_vision::{BoxSettings, log_odds_of};
 
-/// Answers a query by the boxes of all people in the frame and their probabilities.
+/// Answers a query with the boxes of all people in the frame and their probabilities.
 fn answer(
     boxes: &[(Rect, f64)],
     frame: &Frame,
@@ -26,7 +27,7 @@ fn answer(
 fn main() {
     let lens = tagalong_geometry::Pinhole::centred(525.0, 640, 480);
     let camera = tagalong_geometry::Camera::mounted(lens, 640, 480, 1.2, 0.0, 0.0);
-    // A person of 1.7 m at 3 m, before a wall at 5 m.
+    // A person 1.7 m tall at 3 m, in front of a wall at 5 m.
     let person = Rect::new(275.0, 152.0, 90.0, 297.0);
     let depth = tagalong_core::DepthImage::from_fn(640, 480, |x, y| {
         let is_person = (280..360).contains(&x) && (152..449).contains(&y);

@@ -1,5 +1,5 @@
-//! Appearance of a person: colours of upper body and legs, and directions of edges; or the vector
-//! of a network.
+//! Appearance of a person: colours of upper body and legs, and directions of edges; or the
+//! embedding of a network.
 
 use std::sync::Arc;
 
@@ -9,23 +9,23 @@ use tagalong_geometry::{HEAD_BELOW_TOP_M, Rect, UPPER_BODY_SIDE_M};
 
 /// Bins of hues.
 const HUES: usize = 12;
-/// Bins of greys.
+/// Bins of grey levels.
 const GREYS: usize = 4;
 /// Bins of colours: each hue dark and bright, and the greys.
 const COLOURS: usize = 2 * HUES + GREYS;
-/// Bins of edge directions, and one for no edge.
+/// Bins of edge directions, with one for pixels without an edge.
 const EDGES: usize = 9;
-/// Sampled pixels of a patch in each direction.
+/// Number of sampled pixels of a patch along each axis.
 const SAMPLES: usize = 24;
-/// Least number of pixels in a histogram.
+/// Minimum number of pixels in a histogram.
 const LEAST_PIXELS: usize = 24;
-/// Distance from the person's depth from which on a pixel is not the person, m.
+/// Depth difference from which on a pixel does not belong to the person, m.
 const BODY_DEPTH_M: f64 = 0.35;
 /// Saturations between which a colour changes from a grey to a hue.
 const SATURATION: [f64; 2] = [0.08, 0.3];
 /// Slope of the intensity below which there is no edge, grey values per pixel.
 const EDGE: f64 = 6.0;
-/// Upper body and legs: from and to below the centre of the head, and half the width, m.
+/// Upper body and legs: start and end below the centre of the head, and half the width, m.
 const TORSO: [f64; 3] = [0.25, 0.65, 0.17];
 const LEGS: [f64; 3] = [0.9, 1.3, 0.15];
 
@@ -35,7 +35,7 @@ type Histogram<const N: usize> = [f64; N];
 /// Appearance of a person in one frame; parts that the images do not show are missing.
 ///
 /// Hues are weighted by saturation and shared between neighbouring bins, so that a change of the
-/// light moves little of a histogram.
+/// light changes a histogram only a little.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Appearance {
     /// Height of the centre of the head, m.
@@ -43,11 +43,12 @@ pub struct Appearance {
     torso: Option<Histogram<COLOURS>>,
     legs: Option<Histogram<COLOURS>>,
     texture: Option<Histogram<EDGES>>,
-    /// Vector of length 1, in place of all histograms.
+    /// Embedding of length 1, which replaces all histograms.
     vector: Option<Arc<[f32]>>,
 }
 
-/// Distances between two appearances, 0 to 1: of Hellinger, and for vectors 1 minus the cosine.
+/// Distances between two appearances, 0 to 1: Hellinger distances, and for embeddings 1 minus the
+/// cosine.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct AppearanceDifference {
@@ -57,7 +58,7 @@ pub struct AppearanceDifference {
     pub legs: Option<f64>,
     /// Directions of edges on the upper body.
     pub texture: Option<f64>,
-    /// Vectors of a network.
+    /// Embeddings of a network.
     pub vector: Option<f64>,
 }
 
@@ -72,8 +73,8 @@ impl AppearanceDifference {
 }
 
 impl Appearance {
-    /// Returns the appearance of a person by colours and edges, with the upper body in a region of the image, pixels, and
-    /// the head at a position, robot frame, m.
+    /// Returns the appearance of a person by colours and edges. The upper body is given as a region
+    /// of the image, pixels, and the head as a position in the robot frame, m.
     pub(crate) fn at(upper_body: &Rect, head: &Point3<f64>, frame: &Frame) -> Self {
         let torso = Patch::of(upper_body, head, frame, TORSO);
         Self {
@@ -85,19 +86,19 @@ impl Appearance {
         }
     }
 
-    /// Returns the appearance of a person by the vector of a network alone, of length 1.
+    /// Returns the appearance of a person by the embedding of a network alone, of length 1.
     pub(crate) fn of_vector(height_m: f64, vector: Option<Arc<[f32]>>) -> Self {
         Self { height_m, torso: None, legs: None, texture: None, vector }
     }
 
     /// Returns the appearance of a person whose upper body has the colour of one bin, or of none:
-    /// for tests of what remembers appearances.
+    /// for tests of code that stores appearances.
     pub fn in_one_colour(height_m: f64, colour: Option<usize>) -> Self {
         let torso = colour.map(|bin| std::array::from_fn(|i| f64::from(i == bin)));
         Self { height_m, torso, legs: None, texture: None, vector: None }
     }
 
-    /// Returns the distances to another appearance; of parts that one of them lacks, `None`.
+    /// Returns the distances to another appearance; `None` for parts that one of them lacks.
     pub fn difference(&self, other: &Self) -> AppearanceDifference {
         AppearanceDifference {
             torso: both(&self.torso, &other.torso),
@@ -112,10 +113,11 @@ impl Appearance {
     }
 }
 
-/// Returns 1 minus the cosine of the angle between two vectors of length 1, at most 1.
+/// Returns 1 minus the cosine of the angle between two embeddings of length 1, at most 1.
 fn cosine_distance(a: &[f32], b: &[f32]) -> f64 {
     let cosine: f32 = a.iter().zip(b).map(|(a, b)| a * b).sum();
-    // Vectors of two people may point away from each other; they are no less than different.
+    // Embeddings of two people may point in opposite directions, but that is no more than
+    // different.
     (1.0 - f64::from(cosine)).clamp(0.0, 1.0)
 }
 
@@ -130,7 +132,7 @@ fn hellinger<const N: usize>(a: &Histogram<N>, b: &Histogram<N>) -> f64 {
     (1.0 - overlap).max(0.0).sqrt()
 }
 
-/// Pixels of a part of a person.
+/// Image patch of a part of a person.
 struct Patch<'f> {
     frame: &'f Frame,
     area: Rect,
@@ -226,7 +228,7 @@ fn vote(histogram: &mut Histogram<COLOURS>, [r, g, b]: [f64; 3]) {
     let [grey_below, hue_from] = SATURATION;
     let coloured = ((saturation - grey_below) / (hue_from - grey_below)).clamp(0.0, 1.0);
     let bright = ((most - 0.2) / 0.4).clamp(0.0, 1.0);
-    // Soft shares: a small change of light must not move a pixel to another bin at once.
+    // Soft votes, so that a small change of light does not move a pixel to another bin.
     let hue = hue(r, g, b, most, most - least) * HUES as f64;
     let first = hue.floor();
     let share = hue - hue.floor();

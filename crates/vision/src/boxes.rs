@@ -5,16 +5,16 @@ use tagalong_geometry::{Camera, FaceDepth, ImageBox, PointEstimate, Rect, UPPER_
 
 use crate::measured_body::{CUT_OFF_PX, MeasuredBody};
 
-/// Distance of probabilities from 0 and 1 at least.
+/// Minimum distance of probabilities from 0 and 1.
 const SURE: f64 = 1e-3;
 
-/// Least distance of a face from the camera, m: nearer ones are numbers gone wrong.
+/// Minimum distance of a face from the camera, m; lower values are errors.
 const NEAREST_M: f64 = 0.05;
 
 /// Width of a person with the arms, m.
 const PERSON_WIDTH_M: f64 = 0.63;
 
-/// Part of the body that a box encloses, and box that is tracked.
+/// Part of the body that a box encloses, and the box that is tracked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -22,15 +22,15 @@ pub enum BoxedBody {
     /// The whole person, from head to feet; its upper-body square is tracked.
     Full,
     /// The whole person, and the box is tracked as it is. Its position is computed as for `full`.
-    /// For data sets with whole bodies in their ground truth.
+    /// For data sets whose ground truth has whole bodies.
     FullBox,
     /// Head and shoulders, as a square, which is tracked.
     Upper,
 }
 
-/// Settings by which boxes of people in the image become detections with a position.
+/// Settings for turning boxes of people in the image into detections with a position.
 ///
-/// A detector has them among its own settings, with `#[serde(flatten)]`.
+/// A detector includes them in its own settings with `#[serde(flatten)]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct BoxSettings {
@@ -38,12 +38,13 @@ pub struct BoxSettings {
     /// square is tracked; `full-box`, the whole person, and the box is tracked as it is; `upper`,
     /// head and shoulders, as a square.
     pub body: BoxedBody,
-    /// Find the upper body in the box of a whole person by the floor, where the depth image does not
-    /// show the trunk: the feet are where the box ends, and a person whose feet the image border cuts
-    /// off is as wide as the box. For cameras whose height and direction are known, above all those
-    /// that look down.
+    /// Locate the upper body in the box of a whole person from the floor, if the depth image does
+    /// not show the trunk: the lower edge of the box is at the feet, and a person whose feet are
+    /// cut off by the border of the image is as wide as the box. For cameras of known height and
+    /// direction, especially those that look down.
     pub floor: bool,
-    /// Assumed height of a person with the whole body in a box, or with the head above the image, m.
+    /// Assumed height, m, of a person whose whole body is in a box, or whose head is above the
+    /// image.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub height_m: f64,
     /// Standard deviation of the position of a box, pixels.
@@ -56,8 +57,8 @@ pub struct BoxSettings {
     /// fraction of the distance.
     #[schemars(range(min = 1e-6, max = 1e6))]
     pub sigma_distance: f64,
-    /// A search near a track accepts boxes of uncertain distance that overlap the expected box by
-    /// this much (IoU), and ...
+    /// A search near a track accepts boxes of uncertain distance whose overlap with the expected
+    /// box is at least this (IoU), and ...
     #[schemars(range(min = 0.0, max = 1.0))]
     pub near_overlap: f64,
     /// ... positions within this distance on the floor, m.
@@ -100,8 +101,9 @@ impl BoxSettings {
         is_shown(&frame.camera, &detection).then_some(detection)
     }
 
-    /// Returns the upper body of the person in a box, and the depth of the face where that is
-    /// measured: with depth by what is as near as the trunk, otherwise by the box alone.
+    /// Returns the upper body of the person in a box, and the depth of the face if it is measured.
+    /// With a depth image it uses the readings that are as near as the trunk, otherwise the box
+    /// alone.
     fn person_in(&self, frame: &Frame, region: &Rect) -> (Rect, Option<f64>) {
         let depth = frame.depth().ok();
         let whole = depth.filter(|_| self.body != BoxedBody::Upper);
@@ -131,13 +133,14 @@ impl BoxSettings {
         if region.bottom() < camera.height as f64 - CUT_OFF_PX {
             return standing;
         }
-        // The box has the height of a part of the person, so it is the width that tells the scale.
+        // The height of the box is that of a part of the person, so the scale follows from the
+        // width.
         let by_width = region.width * self.height_m / PERSON_WIDTH_M;
         let whole = Rect { height: region.height.max(by_width), ..*region };
         whole.upper_body_of_standing(self.height_m)
     }
 
-    /// Returns the head position for an upper-body square: by the measured depth of the face,
+    /// Returns the head position for an upper-body square, from the measured depth of the face or
     /// otherwise from the size of the square.
     fn locate(
         &self,
@@ -153,8 +156,8 @@ impl BoxSettings {
         sane.then(|| camera.locate_head(upper_body, face, self.sigma_px))
     }
 
-    /// Returns the detections that may be of a track, the best fit first, because a search near a
-    /// track is for one person.
+    /// Returns the detections that may belong to a track, the best fit first, because a search near
+    /// a track looks for one person.
     pub fn near(&self, track: &Track, found: Vec<Detection>) -> Vec<Detection> {
         let fits = found.into_iter().filter_map(|detection| {
             let fit = self.fit(track, &detection)?;
@@ -169,21 +172,21 @@ impl BoxSettings {
     fn fit(&self, track: &Track, detection: &Detection) -> Option<f64> {
         let overlap = detection.rect().map_or(0.0, |rect| track.estimate.region.iou(&rect));
         let away_m = (track.estimate.person.position.xy() - detection.position.xy()).norm();
-        // The distance by size alone may be far off on the floor, so overlap is enough for such a
-        // box.
+        // A distance from size alone may be far off on the floor, so for such a box overlap is
+        // enough.
         let guessed = detection.covariance.diagonal().xy().max() > 0.25 * self.near_m;
         let near = away_m <= self.near_m || guessed && overlap >= self.near_overlap;
         near.then_some(overlap - away_m)
     }
 }
 
-/// Returns true if some of the detection's box is in the image, and all its numbers are sane.
+/// Returns true if part of the detection's box is in the image, and all its numbers are finite.
 pub fn is_shown(camera: &Camera, detection: &Detection) -> bool {
     detection.rect().is_some_and(|rect| rect.clipped(camera.width, camera.height).area() > 0.0)
         && detection.is_sane()
 }
 
-/// Returns the log-odds of a probability, which are finite for 0 and 1, too.
+/// Returns the log-odds of a probability; they are finite for 0 and 1 as well.
 ///
 /// ```
 /// use tagalong_vision::log_odds_of;

@@ -1,4 +1,4 @@
-//! Appearances of people: by colours and edges, or by the vectors of a network.
+//! Appearances of people, by colours and edges or by the embeddings of a network.
 
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -12,31 +12,31 @@ use crate::Appearance;
 
 /// Heights between which a standing person is assumed to be, m.
 const HEIGHTS_M: [f64; 2] = [1.0, 2.2];
-/// Part of a person that must be inside the image.
+/// Minimum part of a person that must be inside the image.
 const LEAST_INSIDE: f64 = 0.5;
-/// Least height of a person, pixels: fewer hold no clothes.
+/// Minimum height of a person, pixels: smaller images do not show clothes.
 const LEAST_PX: f64 = 24.0;
 
-/// Network that turns the image of a person into a vector: those of one person point into one
-/// direction.
+/// Network that turns the image of a person into an embedding: those of the same person have
+/// similar directions.
 pub trait Embedder: Send {
-    /// Returns the vector of the person in a box, pixels; `None` if it was not there in time, or
-    /// has no direction.
+    /// Returns the embedding of the person in a box, pixels; `None` if it was not computed in time,
+    /// or has no direction.
     ///
     /// # Errors
-    /// A frame without an image, and a network that fails.
+    /// A frame without an image, or a failure of the network.
     fn embed(&mut self, frame: &Frame, person: &Rect) -> Result<Option<Vec<f32>>>;
 }
 
-/// Source of [`Appearance`]s for all stages of a pipeline: the vectors of an [`Embedder`] if it has
-/// one, otherwise colours and edges. Copies share the embedder.
+/// Source of [`Appearance`]s for all stages of a pipeline: the embeddings of an [`Embedder`] if it
+/// has one, otherwise colours and edges. Copies share the embedder.
 #[derive(Clone, Default)]
 pub struct Describer {
     shared: Option<Arc<Shared>>,
 }
 
 struct Shared {
-    /// Identity of the network and its settings, by which its answers in a frame are known.
+    /// Identity of the network and its settings; results are cached under it within a frame.
     mark: String,
     embedder: Mutex<Box<dyn Embedder>>,
     missing: AtomicU64,
@@ -49,10 +49,11 @@ impl fmt::Debug for Describer {
     }
 }
 
-/// Vector of a person, of length 1.
+/// Embedding of a person, of length 1.
 type Vector = Arc<[f32]>;
 
-/// Vectors of the people of a frame, by network and box: several stages ask for the same one.
+/// Embeddings of the people in a frame, by network and box, because several stages ask for the same
+/// one.
 struct Vectors(Mutex<Vec<(String, Rect, Option<Vector>)>>);
 
 impl Derived for Vectors {
@@ -62,7 +63,7 @@ impl Derived for Vectors {
 }
 
 impl Describer {
-    /// Creates a describer by a network; `mark` tells it from others.
+    /// Creates a describer with a network; `mark` distinguishes it from others.
     pub fn new(mark: String, embedder: Box<dyn Embedder>) -> Self {
         let embedder = Mutex::new(embedder);
         let missing = AtomicU64::new(0);
@@ -77,8 +78,8 @@ impl Describer {
         self.at(&estimate.region, &estimate.person.position, frame)
     }
 
-    /// Returns the appearance of a person with the upper body, or the whole body, in a region of
-    /// the image, pixels, and the head at a position, robot frame, m.
+    /// Returns the appearance of a person. The upper body, or the whole body, is given as a region
+    /// of the image, pixels, and the head as a position in the robot frame, m.
     ///
     /// # Errors
     /// Those of [`Embedder::embed`].
@@ -93,8 +94,7 @@ impl Describer {
         Ok(Appearance::of_vector(head.z, vector))
     }
 
-    /// Returns the number of people since the last call of this function whose vector was not
-    /// there in time.
+    /// Returns the number of people since the last call whose embedding was not computed in time.
     pub fn take_missing(&self) -> u64 {
         self.shared.as_ref().map_or(0, |shared| shared.missing.swap(0, Ordering::Relaxed))
     }
@@ -117,26 +117,26 @@ impl Shared {
     }
 }
 
-/// Returns a vector of length 1 with this direction; `None` without a direction.
+/// Returns the vector scaled to length 1; `None` for a vector without a direction.
 fn unit(vector: &[f32]) -> Option<Vector> {
     let length = vector.iter().map(|value| value * value).sum::<f32>().sqrt();
     let has_direction = length.is_finite() && length > f32::MIN_POSITIVE;
     has_direction.then(|| vector.iter().map(|value| value / length).collect())
 }
 
-/// Returns the height of a standing person with the head at a position, m.
+/// Returns the height of a standing person whose head is at this position, m.
 fn height_m(head: &Point3<f64>) -> f64 {
     let [least_m, most_m] = HEIGHTS_M;
     head.z.clamp(least_m, most_m)
 }
 
-/// Returns the upper body of the person in a region, which is that of an upper body or of a whole
+/// Returns the upper body of the person in a region, which encloses an upper body or a whole
 /// person.
 fn upper_body(region: &Rect, head: &Point3<f64>) -> Rect {
     if region.is_whole_body() { region.upper_body_of_standing(height_m(head)) } else { *region }
 }
 
-/// Returns the box of a whole person inside the image; `None` if too little of it is there.
+/// Returns the box of a whole person inside the image; `None` if too little of it is inside.
 fn person_box(region: &Rect, head: &Point3<f64>, frame: &Frame) -> Option<Rect> {
     let whole = if region.is_whole_body() {
         *region

@@ -2,25 +2,25 @@ use std::collections::VecDeque;
 
 use crate::{Appearance, AppearanceDifference};
 
-/// Most remembered appearances.
+/// Maximum number of stored appearances.
 const MOST: usize = 24;
 /// Mean difference from the known appearances below which a new one is not stored.
 const NEWS: f64 = 0.06;
 
-/// Appearances of one person, or of several.
+/// Stored appearances of one person, or of several.
 #[derive(Clone, Debug, Default)]
 pub struct Gallery {
     all: VecDeque<Appearance>,
 }
 
 impl Gallery {
-    /// Returns true if nothing is remembered.
+    /// Returns true if no appearance is stored.
     pub fn is_empty(&self) -> bool {
         self.all.is_empty()
     }
 
-    /// Adds an appearance that is new. The oldest one that is not among the first `kept` makes
-    /// place for it.
+    /// Adds an appearance if it is new. If the gallery is full, it replaces the oldest one that is
+    /// not among the first `kept`.
     pub fn add(&mut self, appearance: Appearance, kept: usize) {
         for known in &self.all {
             let is_new = appearance.difference(known).mean().is_some_and(|d| d > NEWS);
@@ -34,7 +34,7 @@ impl Gallery {
         self.all.push_back(appearance);
     }
 
-    /// Returns the difference from the most similar remembered appearance; `None` without one.
+    /// Returns the difference from the most similar stored appearance; `None` without one.
     pub fn nearest(&self, appearance: &Appearance) -> Option<AppearanceDifference> {
         fn mean(d: &AppearanceDifference) -> f64 {
             d.mean().unwrap_or(0.0)

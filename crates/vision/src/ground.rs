@@ -1,6 +1,6 @@
 //! The floor, fitted to the points of a depth image.
 //!
-//! Planes through three points are tried (RANSAC; Fischler and Bolles, CACM 1981) in a fixed
+//! Planes through three random points are tried (RANSAC; Fischler and Bolles, CACM 1981) in a fixed
 //! pseudo-random order, and the best one is refined by least squares over its inliers. The floor is
 //! not the largest plane but the *lowest* large one: points below a plane count against it.
 
@@ -17,7 +17,7 @@ pub struct GroundSettings {
     pub height_m: (f64, f64),
     /// Maximum angle between the image's upward direction and the vertical, rad.
     pub max_tilt_rad: f64,
-    /// Inlier distance at 0 m, m, and its growth with the square of depth.
+    /// Inlier distance at a depth of 0 m, m, and its growth with the square of depth.
     pub tolerance_m: (f64, f64),
     /// Maximum depth of a reading that is used, m.
     pub max_depth_m: f64,
@@ -69,7 +69,7 @@ impl Ground {
         self.up_in_camera.x.atan2(-self.up_in_camera.y)
     }
 
-    /// Returns true if the floor has the tilt that the mount of the camera says.
+    /// Returns true if the tilt of the floor agrees with the mount of the camera.
     pub fn has_tilt_of(&self, camera: &Camera) -> bool {
         let told = camera.robot_from_camera.rotation.inverse() * Vector3::z();
         self.up_in_camera.angle(&told) <= OTHER_TILT_RAD
@@ -81,7 +81,7 @@ impl Ground {
     }
 }
 
-/// Fits the floor to a depth image of a camera, without use of its pose. Returns `None` if no plane
+/// Fits the floor to a depth image of a camera, without using its pose. Returns `None` if no plane
 /// qualifies.
 pub fn ground_of_depth(
     depth: &DepthImage,
@@ -103,29 +103,29 @@ pub fn ground_of_depth(
     ground_of_points(&points, settings)
 }
 
-/// Least sine of the angle below the horizon of a ray that meets the floor.
+/// Minimum sine of the angle below the horizon of a ray that meets the floor.
 const LEAST_DOWN: f64 = 0.08;
-/// Half the width of the window in which readings count as those of one floor, relative.
+/// Half the relative width of the window in which readings count as those of one floor.
 const ONE_FLOOR: f64 = 0.04;
-/// Least number of rays that point down.
+/// Minimum number of rays that point down.
 const LEAST_RAYS: usize = 150;
-/// Least share of the rays that point down that meet the floor.
+/// Minimum fraction of the rays that point down which meet the floor.
 const LEAST_FLOOR: f64 = 0.1;
-/// Largest share of readings that lie clearly below the floor.
+/// Maximum fraction of readings that lie clearly below the floor.
 const MOST_BELOW: f64 = 0.1;
 
-/// Heights of the cameras of robots, m.
+/// Plausible heights of the cameras of robots, m.
 pub const ROBOT_HEIGHTS_M: std::ops::RangeInclusive<f64> = 0.1..=2.5;
-/// Factors of the unit of depth that may come from a mount that is not quite right.
+/// Factors of the depth unit that may be due to a slightly wrong mount.
 pub const PLAUSIBLE_FACTORS: std::ops::RangeInclusive<f64> = 0.6..=1.7;
-/// Angle between the floor and that of the mount beyond which the mount is wrong, rad.
+/// Angle between the fitted floor and the floor of the mount beyond which the mount is wrong, rad.
 const OTHER_TILT_RAD: f64 = 0.17;
 
-/// Returns the factor by which the readings of a camera of known height and tilt have to be multiplied
-/// for the floor to lie where it is; `None` if too little floor is seen, or if the mount is wrong, which
-/// moves the floor as another unit does: its height is no robot's, or the floor has another tilt. Along
-/// each ray that points down, a reading is at most that of the floor, and over the image the floor is met
-/// most often.
+/// Returns the factor by which the readings of a camera of known height and tilt have to be
+/// multiplied so that the floor is at its true height. `None` if too little floor is visible, or if
+/// the mount is wrong, which moves the floor just as another unit does: the camera's height is not
+/// that of a robot, or the floor has another tilt. Along each ray that points down, a reading is at
+/// most that of the floor, and over the image the floor is the most frequent one.
 pub fn factor_of_depth(depth: &DepthImage, camera: &Camera) -> Option<f64> {
     let pose = &camera.robot_from_camera;
     let height_m = pose.translation.vector.z;
@@ -145,7 +145,7 @@ pub fn factor_of_depth(depth: &DepthImage, camera: &Camera) -> Option<f64> {
     }
     ratios.sort_by(f64::total_cmp);
     let most = ratios.iter().step_by(4).map(|ratio| count_near(&ratios, *ratio)).max()?;
-    // The farthest of the frequent ones, because things on the floor are nearer than it.
+    // The farthest of the frequent ratios, because objects on the floor are nearer than the floor.
     let farthest =
         *ratios.iter().rev().find(|ratio| count_near(&ratios, **ratio) * 10 >= most * 7)?;
     let floor = farthest - 0.5 * ONE_FLOOR;
@@ -160,15 +160,15 @@ pub fn factor_of_depth(depth: &DepthImage, camera: &Camera) -> Option<f64> {
     (!is_other_tilt).then_some(factor)
 }
 
-/// Counts the sorted ratios that may be of one floor with this one.
+/// Counts the sorted ratios that may belong to the same floor as this one.
 fn count_near(ratios: &[f64], ratio: f64) -> usize {
     let low = ratio - ONE_FLOOR;
     let high = ratio + ONE_FLOOR;
     ratios.partition_point(|v| *v <= high) - ratios.partition_point(|v| *v < low)
 }
 
-/// Returns true if the floor in readings that are multiplied by a factor has another tilt than the mount
-/// of the camera says.
+/// Returns true if the floor, with readings multiplied by a factor, has another tilt than the
+/// camera's mount implies.
 fn has_other_tilt(depth: &DepthImage, camera: &Camera, factor: f64) -> bool {
     let scaled =
         DepthImage::from_fn(depth.width(), depth.height(), |x, y| depth.row(y)[x] * factor as f32);
@@ -176,13 +176,13 @@ fn has_other_tilt(depth: &DepthImage, camera: &Camera, factor: f64) -> bool {
         .is_some_and(|floor| !floor.has_tilt_of(camera))
 }
 
-/// Leading digits of the units that cameras have.
+/// Leading digits of the units of depth cameras.
 const ROUND_UNITS: [f64; 7] = [1.0, 1.25, 2.0, 2.5, 4.0, 5.0, 8.0];
-/// Accuracy of a unit that is measured by the floor, relative.
+/// Relative accuracy of a unit that is measured by the floor.
 const UNIT_ACCURACY: f64 = 0.03;
 
-/// Returns a measured unit of depth, m, as it may be written: a round number within the accuracy of
-/// the measurement, else one of two digits.
+/// Returns a measured unit of depth, m, as a number to write in a config: a round one within the
+/// accuracy of the measurement, otherwise one with two digits.
 pub fn written_unit_m(measured_m: f64) -> f64 {
     let power = measured_m.log10().floor();
     let tens = [power, power + 1.0];
@@ -215,8 +215,8 @@ pub fn ground_of_points(points: &[Point3<f64>], settings: &GroundSettings) -> Op
         }
     }
     let mut plane = best?.1;
-    // Narrower each time, because the foot of a wall is within the full tolerance, too, and would
-    // tilt the floor.
+    // The tolerance shrinks each time, because the foot of a wall is also within the full
+    // tolerance, and would tilt the floor.
     for part in [1.0, 0.6, 0.4, 0.3, 0.3] {
         plane = refined(&plane, points, &settings.narrowed(part))?;
     }
@@ -240,15 +240,15 @@ fn is_inlier(plane: &Ground, point: &Point3<f64>, settings: &GroundSettings) -> 
     plane.height_of(point).abs() < tolerance(point, settings)
 }
 
-/// Scores a plane by the points on it, the nearer the better (MSAC; Torr and Zisserman, CVIU 2000),
-/// less twice the points well below it.
+/// Scores a plane by the points on it, nearer ones more (MSAC; Torr and Zisserman, CVIU 2000),
+/// minus twice the number of points well below it.
 fn score(plane: &Ground, points: &[Point3<f64>], settings: &GroundSettings) -> f64 {
     let votes = points.iter().map(|point| {
         let height = plane.height_of(point);
         let near = tolerance(point, settings);
         if height.abs() < near {
             1.0 - (height / near).powi(2)
-        // Nothing lies below a floor; a margin of three tolerances leaves room for noise.
+        // Nothing lies below a floor; three tolerances leave room for noise.
         } else if height < -3.0 * near {
             -2.0
         } else {
@@ -281,7 +281,8 @@ fn through(point: &Vector3<f64>, normal: Vector3<f64>) -> Option<Ground> {
     Some(Ground { up_in_camera: up, height_m: -up.dot(point), inliers: 0.0 })
 }
 
-/// Returns the plane through three points at random; `None` of fewer, or if they lie in a line.
+/// Returns the plane through three random points; `None` for fewer points, or if they are
+/// collinear.
 fn random_plane(random: &mut XorShift64, points: &[Point3<f64>]) -> Option<Ground> {
     if points.len() < 3 {
         return None;

@@ -2,8 +2,8 @@ use tagalong_core::{Derived, Frame, GreyImage, Result};
 
 /// Integral image: sums of grey values over upright rectangles by four look-ups each.
 ///
-/// The sums are kept modulo 2³²: the sum over a rectangle of up to 16 million pixels is right,
-/// however large the image.
+/// The sums are kept modulo 2³²: the sum over a rectangle of up to 16 million pixels is right for
+/// images of any size.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Integral {
     width: usize,
@@ -43,25 +43,23 @@ impl Integral {
         self.height
     }
 
-    /// Returns the sums above and to the left of each corner of the pixels, row by row,
-    /// [`Integral::stride`] to a row.
+    /// Returns the sums above and to the left of each pixel corner, row by row, with
+    /// [`Integral::stride`] values per row.
     pub fn sums(&self) -> &[u32] {
         &self.sums
     }
 
-    /// Returns the length of a row of [`Integral::sums`]: one more than the columns.
+    /// Returns the length of a row of [`Integral::sums`]: the number of columns plus one.
     pub fn stride(&self) -> usize {
         self.width + 1
     }
 
-    /// Returns the sum over columns `left..right` and rows `top..bottom`, as far as they lie in the
-    /// image.
+    /// Returns the sum over columns `left..right` and rows `top..bottom`, cut to the image.
     pub fn sum(&self, left: usize, top: usize, right: usize, bottom: usize) -> u32 {
         if right <= left || bottom <= top {
             return 0;
         }
-        // The intermediate differences may be negative; modulo 2³² the result is right all the
-        // same.
+        // The intermediate differences may be negative, but modulo 2³² the result is right.
         self.sum_before(right, bottom)
             .wrapping_sub(self.sum_before(left, bottom))
             .wrapping_sub(self.sum_before(right, top))

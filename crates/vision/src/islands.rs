@@ -1,11 +1,11 @@
 /// Number of axes of a point: columns, and rows.
 const AXES: usize = 2;
 
-/// Cuts points of a grid into islands and passes each of them to `take`, sorted row by row. At
-/// least `gap - 1` whole columns or rows without a point lie between two islands; within one no
-/// such cut is left.
+/// Splits points of a grid into islands and passes each of them to `take`, sorted row by row. At
+/// least `gap - 1` whole columns or rows without a point lie between two islands; within one island
+/// no such gap is left.
 ///
-/// Work around each of a few points is thus done around islands, and not over the bounding
+/// Work around a few scattered points is then done island by island, not over the bounding
 /// rectangle of all of them.
 pub fn islands<T>(
     points: &mut [T],
@@ -16,7 +16,7 @@ pub fn islands<T>(
     cut(points, at, gap, 1, 0, take);
 }
 
-/// Cuts along one axis and then along the other, until `failed` on both.
+/// Splits along one axis and then along the other, until both have `failed`.
 fn cut<T>(
     points: &mut [T],
     at: impl Fn(&T) -> [i64; AXES] + Copy,

@@ -1,6 +1,6 @@
-//! Image arithmetic that several plugins share, and the way from boxes of people to positions.
+//! Image arithmetic that several plugins share, and the conversion of boxes of people to positions.
 //!
-//! Each fast kernel has a slow, obvious reference in its tests.
+//! Each fast kernel has a slow, obvious reference implementation in its tests.
 
 mod appearance;
 mod boxes;

@@ -7,27 +7,27 @@ use tagalong_math::median;
 
 /// Distance of a box from the border of the image up to which it may be cut off, pixels.
 pub(crate) const CUT_OFF_PX: f64 = 3.0;
-/// Depth that the trunk of a person and the arms before it span, m.
+/// Depth range of the trunk of a person and the arms in front of it, m.
 const TRUNK_DEPTH_M: f64 = 0.4;
-/// Part of the width of a box, in its middle, in which the trunk is.
+/// Fraction of the width of a box, in its middle, that contains the trunk.
 const TRUNK_WIDTH: f64 = 0.4;
-/// Parts of the height of a box between which the trunk is.
+/// Fractions of the height of a box between which the trunk lies.
 const TRUNK_ROWS: (f64, f64) = (0.1, 0.6);
-/// Heights below the top of the head between which a head is wider than long hair is thin, m.
+/// Range below the top of the head, m, in which a head is wider than the thin end of long hair.
 const HEAD_ROWS_M: (f64, f64) = (0.04, 0.2);
-/// Parts of the height of a box between which the head of a hidden body is, ...
+/// Fractions of the height of a box between which the head of a hidden body lies, ...
 const HIDDEN_HEAD_ROWS: (f64, f64) = (0.02, 0.12);
-/// ... and part of the width.
+/// ... and fraction of the width.
 const HIDDEN_HEAD_WIDTH: f64 = 0.3;
-/// Height of the tallest people, as a part of the assumed height.
+/// Height of the tallest people, as a multiple of the assumed height.
 const TALLEST: f64 = 1.3;
-/// A head fills at least one part in so many of the area below the upper edge of a box.
+/// A head fills at least one part in this number of the area below the upper edge of a box.
 const HEAD_PART: usize = 8;
 /// Width of a head, m.
 const HEAD_WIDTH_M: f64 = 0.16;
-/// Least number of readings on the trunk.
+/// Minimum number of readings on the trunk.
 const LEAST_READINGS: usize = 20;
-/// Readings along each side of an area at most: more of them say nothing new.
+/// Maximum number of readings along each side of an area: more of them add no information.
 const SAMPLES: f64 = 40.0;
 
 /// Upper body of a person, measured in the depth image.
@@ -48,14 +48,14 @@ struct Reading {
 }
 
 impl MeasuredBody {
-    /// Measures the person of this height, m, in the box around a whole body, or around all of it
-    /// that is in the image. `None` without depth on the trunk, and for other lenses than
+    /// Measures the person of this height, m, in the box around a whole body, or around the part of
+    /// it that is in the image. `None` without depth on the trunk, and for lenses that are not
     /// perspective.
     ///
-    /// The depth of the trunk gives the scale, so that feet or legs that are hidden or cut off do
-    /// no harm; the head is what is as near as the trunk below the upper edge of the box, or
-    /// farther, if something hides the trunk. A head above the image is where a standing person has
-    /// it.
+    /// The depth of the trunk gives the scale, so that hidden or cut-off feet or legs do not
+    /// matter. The head consists of the readings below the upper edge of the box that are as near
+    /// as the trunk, or farther if something hides the trunk. A head above the image is placed
+    /// where a standing person has it.
     pub fn in_box(
         camera: &Camera,
         depth: &DepthImage,
@@ -81,7 +81,8 @@ impl MeasuredBody {
         Some(Self { upper_body: Rect::new(left, top, side, side), face_m })
     }
 
-    /// The upper body of a person with a head that the upper border of the image may cut off.
+    /// Returns the upper body of a person whose head may be cut off by the upper border of the
+    /// image.
     fn below_border(camera: &Camera, trunk: &[Reading], height_m: f64) -> Option<Self> {
         let Reading { column, row, depth_m } = middle(trunk)?;
         let mut head = camera.back_project(Point2::new(column, row), depth_m + HEAD_RADIUS_M);
@@ -91,7 +92,7 @@ impl MeasuredBody {
     }
 }
 
-/// Returns the medians of some readings; `None` of none.
+/// Returns the medians of some readings; `None` without readings.
 fn middle(readings: &[Reading]) -> Option<Reading> {
     Some(Reading {
         column: median(readings.iter().map(|reading| reading.column))?,
@@ -110,7 +111,7 @@ fn head_near(camera: &Camera, depth: &DepthImage, whole: &Rect, trunk_m: f64) ->
     middle(&head).filter(|_| is_seen)
 }
 
-/// Returns the head at the upper edge of a box with another person or a thing in its middle.
+/// Returns the head at the upper edge of a box whose middle shows another person or an object.
 fn head_behind(
     camera: &Camera,
     depth: &DepthImage,
@@ -125,7 +126,7 @@ fn head_behind(
     let all = readings(depth, &area.clipped(depth.width(), depth.height()));
     let head = trunk(&all)?;
     let middle = middle(&head)?;
-    // The wall beside a head is so far away that the box would be that of a giant.
+    // The wall beside a head is so far away that the person would be a giant.
     let shown_m = whole.height * middle.depth_m / camera.focal_px();
     let is_head = 2 * head.len() > all.len() && shown_m < TALLEST * height_m;
     (is_head && middle.depth_m > before_m).then_some(middle)
@@ -138,7 +139,8 @@ fn trunk_area(shown: &Rect) -> Rect {
     Rect::new(left, shown.y + first * shown.height, width, (last - first) * shown.height)
 }
 
-/// The area below the upper edge of a box in which the head is, wherever the person leans.
+/// Returns the area below the upper edge of a box that contains the head, whichever way the person
+/// leans.
 fn head_area(whole: &Rect, px_per_m: f64) -> Rect {
     let (first, last) = HEAD_ROWS_M;
     let beside = 0.5 * HEAD_WIDTH_M * px_per_m;
@@ -146,7 +148,7 @@ fn head_area(whole: &Rect, px_per_m: f64) -> Rect {
     Rect::new(whole.x - beside, top, whole.width + 2.0 * beside, (last - first) * px_per_m)
 }
 
-/// Returns readings of an area inside of the image, evenly spaced.
+/// Returns evenly spaced readings of an area inside of the image.
 fn readings(depth: &DepthImage, area: &Rect) -> Vec<Reading> {
     fn step(size: f64) -> usize {
         (size / SAMPLES).ceil().max(1.0) as usize
@@ -167,8 +169,8 @@ fn readings(depth: &DepthImage, area: &Rect) -> Vec<Reading> {
     found
 }
 
-/// Returns the readings within the depth of a trunk that holds most of them; `None` if these are too
-/// few.
+/// Returns the readings within the depth range of a trunk that contains most of them; `None` if
+/// these are too few.
 fn trunk(readings: &[Reading]) -> Option<Vec<Reading>> {
     let mut sorted = readings.to_vec();
     sorted.sort_by(|a, b| a.depth_m.total_cmp(&b.depth_m));

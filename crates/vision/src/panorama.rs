@@ -1,10 +1,11 @@
 //! Unwrapping of the circular image of a conical mirror.
 //!
-//! Towards the centre of the circle one raw pixel covers many columns of the panorama; there it is
-//! interpolated. Towards the rim a pixel of the panorama covers several raw ones. Sampling only one
-//! of them would alias, so each row is read from a raw image that was halved as often as its
-//! resolution still is that of the row (Williams, "Pyramidal parametrics", SIGGRAPH 1983, without
-//! the blending of levels: a row has one level). All positions and weights are computed once.
+//! Towards the centre of the circle one raw pixel covers many columns of the panorama, which are
+//! interpolated there. Towards the rim a pixel of the panorama covers several raw ones. Sampling
+//! only one of them would alias, so each row is read from a raw image that is halved as often as
+//! its resolution allows without falling below that of the row (Williams, "Pyramidal parametrics",
+//! SIGGRAPH 1983, without blending between levels: a row has one level). All positions and weights
+//! are computed once.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -14,7 +15,7 @@ use tagalong_geometry::Panorama;
 
 /// Pixel type that can be interpolated.
 pub trait Blend: Copy + Default {
-    /// Returns the mean of four, rounded.
+    /// Returns the mean of four pixels, rounded.
     fn mean(four: [Self; 4]) -> Self;
     /// Interpolates bilinearly between upper left, upper right, lower left and lower right, with
     /// the offsets to the right and down in 256ths.
@@ -113,11 +114,11 @@ pub struct Unwrapper<P> {
 }
 
 impl<P: Blend> Unwrapper<P> {
-    /// For raw images of `width` x `height` pixels.
+    /// Creates the unwrapping for raw images of `width` x `height` pixels.
     ///
     /// # Errors
-    /// [`Error::Other`] for numbers that are those of no mirror, an empty
-    /// panorama, or raw images of less than 2 x 2 pixels.
+    /// [`Error::Other`] for numbers that describe no valid mirror, an empty panorama, or raw images
+    /// smaller than 2 x 2 pixels.
     pub fn new(panorama: &Panorama, width: usize, height: usize) -> Result<Self> {
         let empty = panorama.columns == 0 || panorama.rows == 0 || width.min(height) < 2;
         if !panorama.mirror.is_sane() || empty {
@@ -185,7 +186,7 @@ impl<P: Blend> Unwrapper<P> {
     }
 }
 
-/// Unwrapping of colour and grey images of one camera by [`Unwrapper`]s that are made when they are
+/// Unwrapping of colour and grey images of one camera. The [`Unwrapper`]s are created when they are
 /// first needed.
 #[derive(Clone, Debug, Default)]
 pub struct Unwrapping {
@@ -194,8 +195,8 @@ pub struct Unwrapping {
 }
 
 impl Unwrapping {
-    /// Returns the images with the circular ones of the mirror unwrapped; a mirror has neither
-    /// depth nor a right image.
+    /// Returns the images with the circular ones of the mirror unwrapped. A mirror camera has
+    /// neither depth nor a right image.
     ///
     /// # Errors
     /// As [`Unwrapper::new`] and [`Unwrapper::apply`].
@@ -229,8 +230,8 @@ fn halve_row<P: Blend>((upper, lower): (&[P], &[P]), to: &mut [P]) {
     }
 }
 
-/// Returns the number of halvings that keep the raw image as fine as a row: by the geometric mean
-/// of the raw pixels per column and per row of the panorama.
+/// Returns the number of halvings after which the raw image is still as fine as a row, by the
+/// geometric mean of the raw pixels per column and per row of the panorama.
 fn coarseness(panorama: &Panorama, row: usize) -> usize {
     let row = row as f64;
     let [above, own, below] =
@@ -240,7 +241,7 @@ fn coarseness(panorama: &Panorama, row: usize) -> usize {
     (across * down).sqrt().max(1.0).log2() as usize
 }
 
-/// Returns the levels: the raw image and up to `halvings` smaller ones of 2 x 2 pixels at least.
+/// Returns the levels: the raw image and up to `halvings` smaller ones of at least 2 x 2 pixels.
 fn pyramid(width: usize, height: usize, halvings: usize) -> Vec<Level> {
     let mut levels = vec![Level { width, height, start: 0 }];
     let mut start = 0;
@@ -258,7 +259,7 @@ fn pyramid(width: usize, height: usize, halvings: usize) -> Vec<Level> {
 fn tap(panorama: &Panorama, levels: &[Level], level: usize, column: usize, row: usize) -> Tap {
     let Level { width, height, .. } = levels[level];
     let raw = panorama.raw_pixel(column as f64, row as f64);
-    // Pixel centres have whole coordinates on every level.
+    // Pixel centres have integer coordinates on every level.
     let scale = f64::from(1u32 << level);
     let (x, across) = Level::split((raw.x + 0.5) / scale - 0.5, width);
     let (y, down) = Level::split((raw.y + 0.5) / scale - 0.5, height);

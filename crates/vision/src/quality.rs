@@ -35,7 +35,7 @@ impl DepthQuality {
     }
 }
 
-/// Returns the median step between distinct values near one, of sorted readings.
+/// Returns the median step between distinct values near this one, in sorted readings.
 fn step(sorted: &[f32], near: f32) -> Option<f64> {
     let around = &sorted[sorted.partition_point(|z| *z < 0.9 * near)..];
     let around = &around[..around.partition_point(|z| *z <= 1.1 * near)];
@@ -45,7 +45,7 @@ fn step(sorted: &[f32], near: f32) -> Option<f64> {
     steps.get(steps.len() / 2).map(|step| f64::from(*step))
 }
 
-/// Grey level below which a pixel is black, and from which on it is saturated.
+/// Grey levels below which a pixel is black, and from which on it is saturated.
 const BLACK: u8 = 16;
 const WHITE: u8 = 250;
 

@@ -1,10 +1,10 @@
-//! Check of the registration of depth to colour, by the overlap of depth outlines with edges of the
-//! intensity image.
+//! Check of the registration of depth to colour, by the overlap of outlines in depth with edges of
+//! the intensity image.
 //!
 //! An outline in depth is a jump between neighbouring readings of a row (or of a column). Pixels
-//! without a reading between them, the shadow beside a near object, are stepped over, and the
-//! outline belongs to the nearer side. Where depth is registered, the intensity changes across most
-//! outlines; shifted by a few pixels it does not. So the mean change of intensity across all
+//! without a reading between them, the shadow beside a near object, are skipped, and the outline
+//! belongs to the nearer side. If depth is registered, the intensity changes across most outlines;
+//! if it is shifted by a few pixels, it does not. So the mean change of intensity across all
 //! outlines, as a function of the shift of the outlines, peaks at the offset.
 
 use tagalong_core::{DepthImage, GreyImage};
@@ -13,15 +13,15 @@ use tagalong_core::{DepthImage, GreyImage};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct OverlapSettings {
-    /// Largest offset that is tried, to either side, pixels.
+    /// Maximum offset that is tried in each direction, pixels.
     pub reach_px: usize,
-    /// Relative difference of readings beyond which they are on two objects.
+    /// Relative difference of readings beyond which they belong to two objects.
     pub jump: f32,
     /// Longest run without a reading between the two sides of an outline, pixels.
     pub shadow_px: usize,
     /// Maximum depth of a reading that is used, m.
     pub max_depth_m: f32,
-    /// Upper limit to which changes of intensity are clamped, grey levels.
+    /// Limit to which changes of intensity are clamped, grey levels.
     pub ceiling: u8,
 }
 
@@ -35,13 +35,13 @@ impl Default for OverlapSettings {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Offset {
-    /// Columns and rows by which depth has to be moved to lie on colour.
+    /// Columns and rows by which the depth image has to be shifted to match the colour image.
     pub px: [i32; 2],
-    /// Standard errors of both, by leaving out one part of the images after the other, pixels.
+    /// Standard errors of both, by leaving out each part of the images in turn, pixels.
     pub error_px: [f64; 2],
     /// Relative increase of the intensity change across the outlines from no offset to this one.
     pub gain: f64,
-    /// Relative increase from the average over all offsets.
+    /// Relative increase compared with the average over all offsets.
     pub contrast: f64,
     /// Number of outline pixels that were compared.
     pub outlines: u64,
@@ -55,7 +55,7 @@ const PARTS: usize = 8;
 pub struct EdgeOverlap {
     settings: OverlapSettings,
     frames: usize,
-    /// For each part the sums over all offsets, row by row, and the outlines.
+    /// For each part, the sums over all offsets, row by row, and the number of outlines.
     parts: [(Vec<u64>, u64); PARTS],
 }
 
@@ -85,7 +85,7 @@ impl EdgeOverlap {
         self.frames += 1;
     }
 
-    /// Returns the offset, if there are outlines and edges.
+    /// Returns the offset; `None` without outlines and edges.
     pub fn offset(&self) -> Option<Offset> {
         let all = self.without(None);
         let outlines: u64 = self.parts.iter().map(|(_, count)| count).sum();
@@ -108,8 +108,8 @@ impl EdgeOverlap {
         })
     }
 
-    /// Returns the mean change across the outlines for each offset, smoothed, without one of the
-    /// parts.
+    /// Returns the mean change across the outlines for each offset, smoothed; one of the parts can
+    /// be left out.
     fn without(&self, left_out: Option<usize>) -> Vec<f64> {
         let side = 2 * self.settings.reach_px + 1;
         let kept = self.parts.iter().enumerate().filter(|(i, _)| Some(*i) != left_out);
@@ -133,8 +133,8 @@ impl EdgeOverlap {
     }
 }
 
-/// Returns the standard error of a figure from its values without one part each (Quenouille;
-/// Tukey).
+/// Returns the jackknife standard error of a figure, from its values with one part left out each
+/// (Quenouille; Tukey).
 fn jackknife(values: impl Iterator<Item = f64> + Clone) -> f64 {
     let count = values.clone().count() as f64;
     let mean = values.clone().sum::<f64>() / count.max(1.0);
@@ -142,7 +142,7 @@ fn jackknife(values: impl Iterator<Item = f64> + Clone) -> f64 {
     ((count - 1.0).max(0.0) / count.max(1.0) * spread).sqrt()
 }
 
-/// Returns the mean over three by three offsets, so that a jagged peak does not decide.
+/// Returns the mean over three by three offsets, so that noise does not decide where the peak is.
 fn smoothed(scores: &[f64], side: usize) -> Vec<f64> {
     let mut means = Vec::with_capacity(side * side);
     for y in 0..side {
@@ -155,7 +155,7 @@ fn smoothed(scores: &[f64], side: usize) -> Vec<f64> {
     means
 }
 
-/// Changes of intensity from column to column and from row to row.
+/// Changes of intensity between columns and between rows.
 struct Changes {
     width: usize,
     height: usize,
@@ -186,7 +186,7 @@ impl Changes {
         Self { width, height, along_row, along_column }
     }
 
-    /// Adds the changes at all offsets of an outline pixel that stays inside the image at all of
+    /// Adds the changes at all offsets of an outline pixel, if it stays inside the image at all of
     /// them.
     fn collect(&self, (x, y, down): Outline, reach: usize, (sums, count): &mut (Vec<u64>, u64)) {
         // Otherwise the offsets would be means over different outlines.

@@ -2,7 +2,7 @@ use tagalong_core::DepthImage;
 
 use crate::speckle::despeckle;
 
-/// Running sums of a row up to, and without, one pixel.
+/// Running sums of a row, up to but excluding one pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sums {
     /// Number of valid pixels.
@@ -32,7 +32,7 @@ impl Sums {
 /// Inverse-depth image, reduced by an integer factor, with running sums along each row.
 ///
 /// A template that is constant along runs of a row is then matched exactly in a few operations per
-/// row instead of a few per pixel, whatever its size. Inverse depth is the quantity that stereo and
+/// row instead of a few per pixel, at any size. Inverse depth is the quantity that stereo and
 /// structured light measure: its noise is the same at every range, and a far background is a small
 /// number instead of a large one.
 #[derive(Clone, Debug)]
@@ -50,14 +50,14 @@ impl RowSums {
     /// Minimum depth that is represented, m; nearer readings count as invalid.
     pub const MIN_DEPTH_M: f64 = 0.25;
 
-    /// Reduces `depth` by `scale` (at least 1) and sums it up. Each reduced pixel is the first
-    /// valid one of its block, so that small holes close.
+    /// Reduces `depth` by `scale` (at least 1) and computes the sums. Each reduced pixel is the
+    /// first valid one of its block, so that small holes close.
     pub fn new(depth: &DepthImage, scale: usize) -> Self {
         Self::of(reduced(depth, scale.max(1)), depth.width() / scale.max(1), scale.max(1))
     }
 
-    /// As [`RowSums::new`], without noise in single pixels: readings that are near none of their
-    /// neighbours are dropped, and holes of one pixel within a surface are closed.
+    /// As [`RowSums::new`], but removes noise in single pixels: readings that are not near any of
+    /// their neighbours are dropped, and holes of one pixel within a surface are closed.
     pub fn despeckled(depth: &DepthImage, scale: usize) -> Self {
         let (scale, mut values) = (scale.max(1), reduced(depth, scale.max(1)));
         let width = depth.width() / scale;
@@ -73,7 +73,7 @@ impl RowSums {
             sums.push(running);
             sums.extend(values[y * width..(y + 1) * width].iter().map(|value| {
                 let value = u32::from(*value);
-                // Rows are too short for an overflow, and checking for one takes time.
+                // Rows are too short for an overflow, and the check for one takes time.
                 running.count = running.count.wrapping_add(u32::from(value != 0));
                 running.sum = running.sum.wrapping_add(value);
                 running.squares =
@@ -107,7 +107,7 @@ impl RowSums {
         (x < self.width && y < self.height).then(|| self.values[y * self.width + x])
     }
 
-    /// Returns the values of row `y`; 0 is no reading.
+    /// Returns the values of row `y`; 0 means no reading.
     ///
     /// # Panics
     /// If `y` is not below the height.
@@ -152,7 +152,7 @@ fn reduced(depth: &DepthImage, scale: usize) -> Vec<u16> {
 
 /// Fills the empty pixels of a reduced row from one row of its blocks.
 fn fill_row(row: &mut [u16], depth: &[f32], scale: usize) {
-    // Blocks of a known width become vector instructions; images have rarely others.
+    // Blocks of a known width become vector instructions; other widths are rare.
     match scale {
         1 => fill_from_blocks(row, depth.as_chunks::<1>().0),
         2 => fill_from_blocks(row, depth.as_chunks::<2>().0),
@@ -175,8 +175,8 @@ fn fill_from_blocks<const SCALE: usize>(row: &mut [u16], depth: &[[f32; SCALE]])
     }
 }
 
-/// Returns the value of a reduced pixel after another depth of its block. Without branches, so that
-/// loops become vector instructions.
+/// Returns the value of a reduced pixel after another depth of its block. The code has no branches,
+/// so that loops become vector instructions.
 #[inline]
 fn filled(value: u16, depth_m: f32) -> u16 {
     let nearest = RowSums::MIN_DEPTH_M as f32;

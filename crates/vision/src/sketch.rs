@@ -2,8 +2,8 @@ use nalgebra::Point2;
 use tagalong_core::TrackId;
 use tagalong_geometry::Rect;
 
-/// Visualisation of a filter's state, as [`tagalong_core::Filter::visualise`] may return it. Pictures
-/// show it over the image.
+/// Visualisation of a filter's state, as [`tagalong_core::Filter::visualise`] may return it, to be
+/// drawn over the image.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sketch {
     /// Points in the image: particles.
@@ -45,8 +45,8 @@ pub struct SketchMap {
     pub values: Vec<f64>,
 }
 
-/// Visualisation of a likelihood, as [`tagalong_core::Likelihood::visualise`] may return it: for each
-/// person of a scene the runs of pixels that are compared with the depth of the person, nearer
-/// people in front of farther ones.
+/// Visualisation of a likelihood, as [`tagalong_core::Likelihood::visualise`] may return it: for
+/// each person of a scene, the runs of pixels that are compared with the depth of the person, with
+/// nearer people in front of farther ones.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ComparedPixels(pub Vec<Vec<Rect>>);

@@ -1,25 +1,25 @@
 //! Noise in single pixels of an image of inverse depth.
 
-/// Difference of two readings of one surface, as a part of their mean, at most: 1 / 8 ...
+/// Maximum difference of two readings of one surface, as a fraction of their mean: 1 / 8 ...
 const SURFACE_BITS: u32 = 3;
-/// ... or this, in the unit of the values: 0.03 1/m, because the noise of a sensor is as large far
-/// away, where the inverse depth is small, as near by.
+/// ... or this, in the unit of the values: 0.03 1/m, because the noise of a sensor is the same at
+/// all ranges, but the inverse depth is small far away.
 const NOISE: u16 = (0.03 * crate::RowSums::UNITS) as u16;
-/// An image is speckled from one odd reading in so many pixels on, ...
+/// An image is speckled if it has one odd reading in this number of pixels, ...
 const FEW_ODD: usize = 100;
-/// ... or from one hole of a single pixel in so many on. Sensors have fewer of both, at the edges of
-/// what they see and at the end of their reach, and silhouettes allow for these.
+/// ... or one hole of a single pixel in this number. Sensors have fewer of both, at edges and at
+/// the end of their range, and silhouettes allow for these.
 const FEW_HOLES: usize = 20;
-/// Neighbours of a hole that have a reading where it is closed, at least: at a straight edge there
+/// Minimum number of neighbours with a reading for a hole to be closed: at a straight edge there
 /// are three.
 const LEAST_READ: usize = 4;
-/// Times that holes are closed, because their neighbours may be holes, too: of pixels half of which
-/// are missing at random, one in a hundred is left.
+/// Number of times that holes are closed, because their neighbours may be holes as well: if half of
+/// the pixels are missing at random, one in a hundred is left.
 const CLOSINGS: usize = 4;
 
-/// Drops readings that are near none of their eight neighbours, and closes holes with readings
-/// around them, in an image with many of either. Where no pixel stands alone, nothing changes:
-/// neither at the straight edge of a surface or a hole, nor in a line one pixel wide. 0 is no
+/// Drops readings that are not near any of their eight neighbours, and closes holes that have
+/// readings around them, in an image with many of either. Without isolated pixels nothing changes:
+/// neither at the straight edge of a surface or a hole, nor in a line one pixel wide. 0 means no
 /// reading.
 pub(crate) fn despeckle(values: &mut [u16], width: usize) {
     let Speckles { odd, holes } = Speckles::count(values, width);
@@ -28,10 +28,11 @@ pub(crate) fn despeckle(values: &mut [u16], width: usize) {
     }
 }
 
-/// Numbers of pixels that differ from both neighbours in their row, which agree.
+/// Numbers of pixels that differ from both of their neighbours in the row, which agree with each
+/// other.
 #[derive(Debug, PartialEq)]
 struct Speckles {
-    /// Readings of another depth.
+    /// Readings of a different depth.
     odd: usize,
     /// Pixels without a reading.
     holes: usize,
@@ -55,12 +56,12 @@ impl Speckles {
     }
 }
 
-/// Pixels whose numbers are counted in 16 bits.
+/// Number of pixels whose counts fit in 16 bits.
 const BLOCK: usize = 1 << 14;
 
-/// Returns how many pixels in the middle are odd, and how many are holes. Counts as wide as the
-/// pixels, and without a check for an overflow that no block can have, let the loop become vector
-/// instructions.
+/// Returns the number of odd pixels and the number of holes in the middle row. Counts of the width
+/// of the pixels, without a check for an overflow that no block can have, let the loop become
+/// vector instructions.
 fn count(left: &[u16], middle: &[u16], right: &[u16]) -> [u16; 2] {
     let [mut odd, mut holes] = [0u16; 2];
     for ((left, middle), right) in left.iter().zip(middle).zip(right) {
@@ -104,7 +105,7 @@ fn pass(from: &[u16], to: &mut [u16], stride: usize, change: impl Fn(Patch) -> u
     let width = stride - 2;
     let lines = from.len() / stride;
     for y in 1..lines.saturating_sub(1) {
-        // Nine rows of one length each: the loop becomes vector instructions.
+        // Nine rows of equal length: the loop becomes vector instructions.
         let rows = [y - 1, y, y + 1].map(|y| {
             let row = &from[y * stride..(y + 1) * stride];
             [&row[..width], &row[1..=width], &row[2..]]
@@ -116,12 +117,12 @@ fn pass(from: &[u16], to: &mut [u16], stride: usize, change: impl Fn(Patch) -> u
     }
 }
 
-/// Returns true if two readings may be of one surface.
+/// Returns true if two readings may belong to one surface.
 fn is_near(a: u16, b: u16) -> bool {
     a.abs_diff(b) <= (a.midpoint(b) >> SURFACE_BITS).max(NOISE)
 }
 
-/// Returns the pixel in the middle, or none if it is near no neighbour.
+/// Returns the pixel in the middle, or 0 if it is not near any neighbour.
 fn kept(patch: Patch) -> u16 {
     let middle = patch[1][1];
     let near = beside(patch)

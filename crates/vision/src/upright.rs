@@ -3,15 +3,15 @@ use tagalong_core::{DepthImage, GreyImage};
 use tagalong_geometry::Camera;
 
 /// Upright plane through a person's head, perpendicular to the line of sight, sampled from an
-/// image: the whole body, always at the same scale and from the floor up.
+/// image. It shows the whole body from the floor up, always at the same scale.
 ///
-/// The pixel of each cell follows from the camera's pose, so that the stand of a coat, the pot of a
-/// plant and the legs of a person are at the same cells at any distance.
+/// The pixel of each cell follows from the camera's pose, so that the foot of a coat stand, the pot
+/// of a plant and the legs of a person are in the same cells at any distance.
 #[derive(Clone, Debug)]
 pub struct Upright {
     /// Left and right end of each row.
     rows: [[End; 2]; Self::ROWS],
-    /// True in a panorama, where columns are counted modulo the width.
+    /// True for a panorama, whose columns are counted modulo the width.
     is_around: bool,
 }
 
@@ -25,8 +25,8 @@ struct End {
 /// Intensities on the plane.
 #[non_exhaustive]
 pub struct UprightGrey {
-    /// Intensities, row by row from the top, from left to right. Cells outside the image continue
-    /// its border.
+    /// Intensities, row by row from the top, from left to right. Cells outside the image repeat its
+    /// border.
     pub grey: [f32; Upright::CELLS],
     /// True for each cell that lies inside the image.
     pub is_seen: [bool; Upright::CELLS],
@@ -87,8 +87,8 @@ impl Upright {
         Some(out)
     }
 
-    /// Yields the depth of the image minus that of the plane, at every n-th cell of every n-th row,
-    /// along the optical axis, m; `None` without a depth reading.
+    /// Yields the depth of the image minus that of the plane along the optical axis, m, at every
+    /// n-th cell of every n-th row; `None` without a depth reading.
     pub fn behind_m<'a>(
         &'a self,
         depth: &'a DepthImage,
@@ -100,7 +100,7 @@ impl Upright {
         })
     }
 
-    /// Returns how far the reading at a cell lies behind the plane, m.
+    /// Returns the distance by which the reading at a cell lies behind the plane, m.
     #[inline]
     fn reading_behind(&self, depth: &DepthImage, End { pixel, ahead_m }: End) -> Option<f32> {
         let (x, has_column) = self.column(pixel.x, depth.width());
@@ -109,7 +109,7 @@ impl Upright {
         (reading.is_finite() && reading > 0.0).then_some(reading - ahead_m as f32)
     }
 
-    /// Returns the column of a place, and true if it lies inside the image.
+    /// Returns the column of a position, and true if it lies inside the image.
     fn column(&self, place: f64, width: usize) -> (usize, bool) {
         if self.is_around {
             nearest(place.rem_euclid(width as f64), width)
@@ -128,7 +128,7 @@ impl Upright {
     }
 }
 
-/// Row of the plane. A straight line of the plane is one of the image, nearly evenly spaced.
+/// Row of the plane. A straight line of the plane is one of the image, with nearly even spacing.
 #[derive(Clone, Copy)]
 struct Line {
     from: End,

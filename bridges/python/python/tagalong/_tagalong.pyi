@@ -48,7 +48,7 @@ class Camera:
         """Rows of the image."""
     @property
     def focal_px(self) -> float:
-        """Focal length along columns, pixels; of a panorama pixels per radian."""
+        """Focal length along columns, pixels; for a panorama pixels per radian."""
     @property
     def robot_from_camera(self) -> NDArray[np.float64]:
         """Pose of the camera in the robot frame, 4 x 4."""
@@ -60,7 +60,7 @@ class Track:
     """A tracked person in one frame. Lengths are metres in the robot's frame: x forward, y left, z up."""
     @property
     def id(self) -> int:
-        """Number of the track, never used twice."""
+        """ID of the track, never used twice."""
     @property
     def position(self) -> NDArray[np.float64]:
         """Centre of the head, (x, y, z), m."""
@@ -82,19 +82,19 @@ class Track:
         """
     @property
     def body_direction(self) -> Optional[float]:
-        """Direction in which the body is turned, rad from the x axis of the robot's frame to the left; None
-        where joints do not show it.
+        """Direction in which the body is turned, rad from the x axis of the robot frame to the left;
+        None if the joints do not show it.
         """
     @property
     def raised_hand(self) -> Optional[bool]:
         """True if a hand is held above the head; None without joints."""
     @property
     def score(self) -> float:
-        """Probability that this is a person, smoothed over the track; its log-odds are `score` in Rust."""
+        """Probability that this is a person, smoothed over the track; `score` in Rust is its log-odds."""
     @property
     def seen(self) -> bool:
-        """True if evidence of this frame supports the track; otherwise it is predicted, ever less
-        surely, also outside of the view.
+        """True if the track has evidence in this frame; otherwise it is predicted, with growing
+        uncertainty, even outside of the view.
         """
     @property
     def confirmed(self) -> bool:
@@ -104,17 +104,17 @@ class Track:
         """True if a nearer tracked person hides this one."""
     @property
     def age(self) -> int:
-        """Frames since the track started."""
+        """Number of frames since the track started."""
     @property
     def unseen_s(self) -> float:
-        """Seconds since evidence last supported the track."""
+        """Time since the track last had evidence, s."""
 
 @final
 class Command:
     """A velocity for the robot, with its reason and the time until which it is valid."""
     @property
     def linear_mps(self) -> float:
-        """Speed forward, m/s."""
+        """Forward speed, m/s."""
     @property
     def lateral_mps(self) -> float:
         """Speed to the left, m/s."""
@@ -126,10 +126,10 @@ class Command:
         """Speeds of the wheels of a differential drive, (left, right), m/s."""
     @property
     def stamp_ns(self) -> int:
-        """Capture time of the frame that it responds to, ns."""
+        """Capture time of the frame to which it responds, ns."""
     @property
     def valid_until_ns(self) -> int:
-        """Time at which the wheels stop unless a newer command has come, ns."""
+        """Time at which the wheels stop unless a newer command has arrived, ns."""
     @property
     def reason(self) -> str:
         """Reason for the speeds: "follow", "obstacle", "no-target" and others."""
@@ -139,59 +139,62 @@ class Report:
     """Result of a frame."""
     @property
     def index(self) -> int:
-        """Number of the frame, from 1."""
+        """Index of the frame, from 1."""
     @property
     def stamp_ns(self) -> int:
         """Capture time, ns."""
     @property
     def outcome(self) -> str:
-        """"processed"; or, by its stamp: "duplicate" (that of the frame before) and "out-of-order" (a little
-        older), where the frame was left out; "reset-backward" and "reset-forward" (the clock was set back,
-        or jumped ahead), where all tracks ended before it was processed.
+        """"processed", or another outcome because of its stamp: for "duplicate" (the stamp of the
+        previous frame) and "out-of-order" (slightly older) the frame was left out; for
+        "reset-backward" and "reset-forward" (the clock was set back, or jumped ahead) all tracks
+        ended before the frame was processed.
         """
     @property
     def tracks(self) -> list[Track]:
-        """The confirmed tracks, near to far; also those that are predicted, see `Track.seen`."""
+        """The confirmed tracks, nearest first, including predicted ones; see `Track.seen`."""
     @property
     def tentative(self) -> list[Track]:
         """Tracks that are not confirmed yet."""
     @property
     def ended(self) -> list[int]:
-        """Numbers of the tracks that ended in this frame."""
+        """IDs of the tracks that ended in this frame."""
     @property
     def command(self) -> Optional[Command]:
         """Command for the wheels; None without a controller."""
     @property
     def target(self) -> Optional[int]:
-        """Track of the person to follow."""
+        """ID of the track of the person to follow."""
     @property
     def dropped(self) -> dict[str, int]:
         """Number of candidates that each test dropped."""
     @property
     def timings_ms(self) -> dict[str, float]:
-        """Milliseconds of each stage."""
+        """Time of each stage, ms."""
 
 @final
 class Frame:
     """One moment of a log: images, camera, and the robot's pose."""
     @property
     def index(self) -> int:
-        """Number of the image in the log, from 1."""
+        """Index of the image in the log, from 1."""
     @property
     def stamp_ns(self) -> int:
         """Capture time, ns."""
     @property
     def colour(self) -> Optional[NDArray[np.uint8]]:
-        """Colour image, rows x columns x 3, or grey, rows x columns, uint8; None without."""
+        """Colour image, rows x columns x 3, or grey image, rows x columns, uint8; None without one."""
     @property
     def depth(self) -> Optional[NDArray[np.float32]]:
-        """Depth along the optical axis, m, rows x columns, float32; NaN is no reading. None without."""
+        """Depth along the optical axis, m, rows x columns, float32; NaN where there is no reading.
+        None without a depth image.
+        """
     @property
     def scan(self) -> Optional[NDArray[np.float64]]:
-        """Points of the laser scan, rows of x, y, z, m, robot frame; None without."""
+        """Points of the laser scan, rows of x, y, z, m, robot frame; None without a scan."""
     @property
     def camera(self) -> Optional[Camera]:
-        """The camera; None in a frame of a laser scan alone."""
+        """The camera; None for a frame that has only a laser scan."""
     @property
     def pose(self) -> tuple[float, float, float]:
         """Pose of the robot in the odometry frame: x, y (m), heading (rad)."""
@@ -209,7 +212,7 @@ class Frames(Iterator[Frame]):
     def __next__(self) -> Frame: ...
     @property
     def counters(self) -> dict[str, int]:
-        """Counters so far: messages read, images skipped with their reasons, damage."""
+        """Counters so far: messages that were read, images that were skipped by reason, and damage."""
     @property
     def notes(self) -> list[str]:
         """Remarks about the log."""
@@ -219,7 +222,7 @@ class Frames(Iterator[Frame]):
 
 @final
 class Pipeline:
-    """A pipeline: detectors, verifiers, association, filter, and a controller where the config has one."""
+    """A pipeline: detectors, verifiers, association, filter, and a controller if the config has one."""
     @staticmethod
     def from_toml(
         source: _Path, *, folder: Optional[_Path] = None, seed: Optional[int] = None
@@ -227,10 +230,10 @@ class Pipeline:
         """Builds a pipeline.
 
         source: the path of a TOML file, the name of a built-in config ("depth-verified"), or the
-        text of a config itself: a str with a line break or a `=`. folder: base of relative paths in
-        a text. seed: instead of the config's.
+        text of a config: a str that contains a line break or a `=`. folder: base folder of relative
+        paths in such a text. seed: replaces the seed of the config.
 
-        Raises ConfigError with line and remedy.
+        Raises ConfigError, with the line and the remedy.
         """
     def step(
         self,
@@ -248,50 +251,50 @@ class Pipeline:
         odometry_age_s: Optional[float] = None,
         detections: Optional[ArrayLike] = None,
     ) -> Report:
-        """Takes one frame through the pipeline and returns a Report.
+        """Runs the pipeline on one frame and returns a Report.
 
-        Raises ValueError for a frame that cannot be used, such as one without depth for a pipeline that
-        needs it: the frame leads to no command, and the next one is taken as usual.
+        Raises ValueError for a frame that cannot be used, such as one without depth for a pipeline
+        that needs it: no command follows from this frame, and the next one is processed as usual.
 
         colour: uint8, rows x columns x 3 (red, green, blue) or rows x columns. depth: float32 in
-        metres or uint16 in millimetres, registered to colour. camera: a Camera, of the size of the
-        images. pose: of the robot in the odometry frame, (x, y, heading) or 4 x 4; None without
-        odometry. stamp: capture time, ns as an int or seconds as a float. scan: float64, rows of
-        x, y or x, y, z of a laser scan in the robot frame. scan_stamp: time of the scan, as stamp,
-        where the scanner is slower than the images and its last scan is given again [default:
-        stamp]. right, baseline_m: the right image of a rectified stereo pair. index: number of the
-        frame [default: frames so far]. odometry_age_s: age of the reading of odometry from which the
-        pose is, at the time of the stamp; a robot is not steered by an old one [default: 0, and
-        infinite without a pose]. detections: those of a detector of your own, for a config with the
-        plugin `recorded-detections` ("recorded"): rows of x, y, width, height, score, pixels of the
-        camera's image, or of x, y, z, score, the centre of the head in the robot frame, m; [] where
-        it found no person, None where it did not run.
+        metres or uint16 in millimetres, registered to colour. camera: a Camera with the size of the
+        images. pose: pose of the robot in the odometry frame, (x, y, heading) or 4 x 4; None
+        without odometry. stamp: capture time, ns as an int or seconds as a float. scan: float64,
+        rows of x, y or x, y, z of a laser scan in the robot frame. scan_stamp: time of the scan,
+        given like stamp, if the scanner is slower than the images and its last scan is passed again
+        [default: stamp]. right, baseline_m: the right image of a rectified stereo pair, and its
+        baseline, m. index: index of the frame [default: number of frames so far]. odometry_age_s:
+        age of the odometry that the pose comes from, at the time of the stamp; a robot is not
+        steered by old odometry [default: 0, and infinite without a pose]. detections: the output of
+        your own detector, for a config with the plugin `recorded-detections` ("recorded"): rows of
+        x, y, width, height, score, in pixels of the camera's image, or of x, y, z, score, with the
+        centre of the head in the robot frame, m; [] if it found no person, None if it did not run.
         """
     def step_frame(self, frame: Frame) -> Report:
-        """Takes a frame of `frames` through the pipeline, as the program does."""
+        """Runs the pipeline on a frame of `frames`, as the program does."""
     def frames(self, log: _Path) -> Frames:
         """Opens a log (.mcap, .db3, .bag, or the folder of a recording) for this pipeline, with the
         `[input]` of its config, and returns its frames.
         """
     def command_at(self, stamp: _Stamp) -> Optional[Command]:
-        """The command in force at a time (as `stamp` of `step`): the last one until it expires, zero
-        after that; None without a controller.
+        """The command in force at a time (given like `stamp` of `step`): the last one until it
+        expires, then zero; None without a controller.
         """
     def choose_target(self, track: int) -> None:
-        """Follows the person of this track; `ValueError` without a controller, or without such a track in
-        the last frame.
+        """Follows the person of this track. Raises ValueError without a controller, or if the last
+        frame has no such track.
         """
     def disarm(self) -> None:
         """Stops the robot until `arm`."""
     def arm(self) -> None:
         """Lets the robot move again after a fault that a person has checked."""
     def set_driving(self, is_driving: bool) -> None:
-        """Tells whether the base executes the commands from now on. Only then are they compared with the
-        odometry: a base that does something else, or responds too late, is a fault.
+        """Sets whether the base executes the commands from now on. Only then are they compared with
+        the odometry: a base that does something else, or responds too late, is a fault.
         """
     @property
     def fault(self) -> Optional[str]:
-        """The fault that holds the robot until `arm`; None without one."""
+        """The fault that stops the robot until `arm`; None without one."""
     @property
     def has_controller(self) -> bool:
         """True if the config has a controller."""

@@ -1,11 +1,12 @@
-//! Words for the permission to move, and for the publishers of the enable.
+//! Messages about the permission to move, and about the publishers of the enable.
 
 use tagalong::pipeline::Permission;
 
 use super::CONTESTED;
 use crate::Options;
 
-/// Returns what is missing for a permission; `enables` is the number of publishers of the enable.
+/// Returns a message about what is missing for a permission; `enables` is the number of publishers
+/// of the enable.
 pub(super) fn remedy(permission: Permission, enables: usize, options: &Options) -> String {
     let Options { enable, reset, .. } = options;
     let needed = match permission {
@@ -18,9 +19,9 @@ pub(super) fn remedy(permission: Permission, enables: usize, options: &Options) 
              comes again"
         ),
         Permission::Latched(CONTESTED) => format!(
-            ": the robot stands, because two hands at one switch cannot stop each other; end all \
-             publishers on {enable} but one (`ros2 topic info --verbose` names them), then send a message \
-             on {reset}, and begin to send `true` on {enable}"
+            ": the robot stands, because with several publishers of the enable none of them can \
+             stop it; end all publishers on {enable} but one (`ros2 topic info --verbose` names \
+             them), then send a message on {reset}, and begin to send `true` on {enable}"
         ),
         Permission::Latched(_) => format!(
             ": the robot stands until a message on {reset}, after which `true` begins on {enable}"
@@ -30,12 +31,13 @@ pub(super) fn remedy(permission: Permission, enables: usize, options: &Options) 
     needed + &unheard.unwrap_or_default()
 }
 
-/// Says that the robot cannot be enabled: no publisher of the enable is discovered.
+/// Returns a message that the robot cannot be enabled, because no publisher of the enable is
+/// discovered.
 pub(super) fn nobody(permission: Permission, enables: usize, enable: &str) -> Option<String> {
     (enables == 0 && !permission.is_granted()).then(|| format!("nobody publishes {enable}"))
 }
 
-/// Says that the publishers of the enable became known, or are no longer.
+/// Returns a message that publishers of the enable appeared or disappeared.
 pub(super) fn change_of_publishers(before: usize, now: usize, enable: &str) -> Option<String> {
     match (before, now) {
         (0, 1..) => Some(format!("found a publisher of {enable}")),

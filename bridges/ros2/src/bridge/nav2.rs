@@ -1,4 +1,4 @@
-//! The following server of Nav2, which is found while the bridge works.
+//! Nav2's following server, which is discovered while the bridge works.
 
 use super::Bridge;
 use crate::BridgeError;
@@ -9,7 +9,7 @@ use crate::nav2::{Feedback, FollowGoal, FollowResult, Follower, HUMBLE, HumbleRe
 const KIND: &str = "FollowObject";
 
 impl Bridge {
-    /// Says for which action the bridge waits.
+    /// Reports for which action the bridge waits.
     pub(super) fn tell_action(&self, tell: &dyn Fn(&str)) {
         if let Some(action) = &self.options.follow_object {
             tell(&format!(
@@ -18,7 +18,7 @@ impl Bridge {
         }
     }
 
-    /// Looks for the server, starts its client, and tells what it said.
+    /// Looks for the server, starts its client, and reports its messages.
     pub(super) fn look_at_follower(&mut self, tell: &dyn Fn(&str)) {
         let Some(action) = self.options.follow_object.clone() else { return };
         let package = self.network.action_package(&action);

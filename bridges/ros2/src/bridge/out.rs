@@ -1,4 +1,4 @@
-//! Results that go out, for programs and for viewers.
+//! Published results, for programs and for viewers.
 
 use ros2_client::Publisher;
 use serde::Serialize;
@@ -13,7 +13,7 @@ use crate::forecast::{Forecast, Now, OccupancyGrid};
 use crate::network::Network;
 use crate::{BridgeError, Options};
 
-/// Publishers of the results. Subscribers are not waited for, so a message may be lost.
+/// Publishers of the results. They do not wait for subscribers, so a message may be lost.
 pub(super) struct Out {
     tracks: Publisher<Detection3DArray>,
     target: Publisher<PoseStamped>,
@@ -24,12 +24,12 @@ pub(super) struct Out {
     transforms: Option<Publisher<TFMessage>>,
     markers: Option<Publisher<MarkerArray>>,
     trails: Trails,
-    /// Time and frame of the last markers.
+    /// Time and frame id of the last markers.
     drawn: Option<(Stamp, String)>,
 }
 
 impl Out {
-    /// Creates the publishers that the options ask for.
+    /// Creates the publishers that the options request.
     pub(super) fn new(options: &Options, network: &mut Network) -> Result<Self, BridgeError> {
         let forecast = match options.forecast.as_str() {
             "" => None,
@@ -52,7 +52,7 @@ impl Out {
         })
     }
 
-    /// Publishes the results of a frame; `world` is the frame in which people walk, that of the
+    /// Publishes the results of a frame; `world` is the frame for the people's motion, that of the
     /// odometry if there is one.
     pub(super) fn publish(
         &mut self,
@@ -87,7 +87,7 @@ impl Out {
         self.draw(record, world);
     }
 
-    /// Publishes the shapes of people and the transforms to them.
+    /// Publishes the shapes of people and their transforms.
     fn draw(&mut self, record: &FrameRecord<'_>, world: &str) {
         if let Some(publisher) = &self.transforms {
             let transforms = write::person_transforms(record, world);
@@ -115,7 +115,7 @@ impl Out {
     }
 }
 
-/// A publisher of a topic; none where the topic has no name.
+/// Returns a publisher for a topic; `None` if the topic has no name.
 fn publisher_if_named<M: Message + Serialize>(
     network: &mut Network,
     topic: &str,

@@ -1,4 +1,4 @@
-//! Enables that arrive, and commands that go out to the wheels.
+//! Arriving enables, and commands that are sent to the wheels.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -17,11 +17,12 @@ use crate::stamps::{StampClock, system_time};
 use crate::wheels::{SwitchHandle, Wheels};
 use crate::{BridgeError, Options};
 
-/// Takes a message of the enable topic to the switch: `origin` is that of a true, `None` is a false.
+/// Passes a message of the enable topic to the switch: `origin` is that of a message that is true;
+/// `None` means false.
 pub(super) fn take_enable(switch: &SwitchHandle, gate: &Gate, origin: Option<Origin>) {
     let now = switch.now();
     let Some(origin) = origin else {
-        // A stop counts from every publisher and at every age.
+        // A stop counts from every publisher and at any age.
         switch.take(Enable::Off, now);
         return;
     };
@@ -31,22 +32,22 @@ pub(super) fn take_enable(switch: &SwitchHandle, gate: &Gate, origin: Option<Ori
             switch.take(Enable::Fault(CONTESTED), now);
             return;
         }
-        // Too old to move the robot, but no release of the button either.
+        // Too old to move the robot, but not a release of the button either.
         Err(Unfit::Untimely(age_s)) => Duration::try_from_secs_f64(age_s).unwrap_or(Duration::MAX),
     };
-    // A message from before the switch was there says nothing to it, nor does one from the future.
+    // A message from before the switch existed does not count, nor does one from the future.
     if let Some(published) = now.checked_sub(age) {
         switch.take(Enable::On, published);
     }
 }
 
-/// Tells that messages of a topic do not count for their age, once for each row of them.
+/// Reports that messages of a topic are ignored because of their age, once for each series of them.
 pub(super) fn tell_untimely(gate: &Gate, what: &str, topic: &str, tell: &dyn Fn(&str)) {
     let Some(age_s) = gate.take_untold() else { return };
     let state = if age_s > 0.0 { "old" } else { "ahead" };
     tell(&format!(
-        "a {what} on {topic} was {:.1} s {state} by the clock of its publisher: it does not count; if \
-         all are, synchronise the clocks of both machines",
+        "a {what} on {topic} was {:.1} s {state} by the clock of its publisher: it is ignored; if \
+         all of them are, synchronise the clocks of both machines",
         age_s.abs()
     ));
 }
@@ -74,13 +75,13 @@ pub(super) fn drive(
     })
 }
 
-/// Returns a function that publishes commands as the type that the options name.
+/// Returns a function that publishes commands with the type that the options name.
 pub(super) fn command_publisher(
     options: &Options,
     network: &mut Network,
 ) -> Result<Box<dyn Fn(TwistStamped) + Send>, BridgeError> {
     let topic = &options.command;
-    // A full queue means that the previous command has not been read.
+    // A full queue means that the previous command has not been read yet.
     Ok(match options.command_type {
         CommandType::TwistStamped => {
             let publisher: Publisher<TwistStamped> = network.publisher(topic)?;
@@ -106,7 +107,7 @@ pub(super) fn twist(WheelSpeeds { left, right }: WheelSpeeds, half_m: f64) -> Tw
     twist
 }
 
-/// Returns the data that a controller may need and that has arrived.
+/// Returns the sources of data that a controller may need and that have arrived.
 pub(crate) fn sources(source: &LiveSource) -> Sources {
     let facts = source.facts();
     Sources {

@@ -1,4 +1,4 @@
-//! Places that the sensors of a frame see.
+//! Positions that the sensors of a frame observe.
 
 use std::f64::consts::TAU;
 
@@ -8,12 +8,13 @@ use tagalong::nalgebra;
 
 /// Heights above the floor at which a person is looked for, m: shins, hips, head.
 const HEIGHTS_M: [f64; 3] = [0.3, 0.9, 1.6];
-/// Distance behind a measured surface within which a place is seen, m: a person is that deep.
+/// Distance behind a measured surface within which a position counts as observed, m: the depth of a
+/// person.
 const BEHIND_M: f64 = 0.4;
-/// Distance up to which a person is seen without a measured depth, m.
+/// Maximum distance at which a person is seen without a measured depth, m.
 const FAR_M: f64 = 10.0;
 
-/// View of the sensors of a frame.
+/// Visibility for the sensors of a frame.
 pub(super) struct Sight<'a> {
     frame: &'a Frame,
     depth: Option<&'a DepthImage>,
@@ -27,9 +28,9 @@ impl<'a> Sight<'a> {
         Self { frame, depth, has_points: frame.sensor::<PointCloud>().is_ok() }
     }
 
-    /// Returns true if a person that stands at a place, robot frame, would be seen.
+    /// Returns true if a person standing at a position, in the robot frame, would be seen.
     pub(super) fn sees(&self, at: &Point2<f64>) -> bool {
-        // A lidar of several layers looks all around.
+        // A lidar with several layers has a full field of view.
         self.has_points && at.coords.norm() <= FAR_M
             || self.frame.scans().any(|scan| scan_sees(scan, at))
             || HEIGHTS_M.iter().any(|height_m| self.camera_sees(&at.coords.push(*height_m).into()))
@@ -47,7 +48,7 @@ impl<'a> Sight<'a> {
         }
         let away_m = camera.depth_of(at);
         match self.depth {
-            // A pixel without a reading says nothing.
+            // A pixel without a reading gives no information.
             Some(depth) => depth
                 .get(column as i64, row as i64)
                 .is_some_and(|surface_m| f64::from(surface_m) + BEHIND_M >= away_m),
@@ -56,7 +57,7 @@ impl<'a> Sight<'a> {
     }
 }
 
-/// Returns true if a ray of the scan passes a place, or ends there.
+/// Returns true if a ray of the scan passes a position, or ends there.
 fn scan_sees(scan: &LaserScan, at: &Point2<f64>) -> bool {
     let from_scanner = scan.robot_from_scanner.inverse_transform_point(&at.coords.push(0.0).into());
     let direction_rad = from_scanner.y.atan2(from_scanner.x);
@@ -71,7 +72,7 @@ fn scan_sees(scan: &LaserScan, at: &Point2<f64>) -> bool {
         && away_m <= FAR_M
 }
 
-/// Returns the number of the ray that looks in a direction of the scanner's frame.
+/// Returns the index of the ray in a direction of the scanner's frame.
 fn ray_towards(scan: &LaserScan, direction_rad: f64) -> Option<u32> {
     if scan.increment_rad == 0.0 {
         return None;

@@ -70,7 +70,7 @@ const SUCCESS: &str = "transition_success";
 const FAILURE: &str = "transition_failure";
 const ERROR: &str = "transition_error";
 
-/// All transitions: first those for which a caller may ask, then those that end them.
+/// All transitions: first those that a caller may request, then those that end them.
 pub(crate) const TRANSITIONS: [Transition; 25] = [
     CONFIGURE,
     CLEAN_UP,
@@ -100,7 +100,7 @@ pub(crate) const TRANSITIONS: [Transition; 25] = [
 ];
 
 impl NodeState {
-    /// Returns the transitions that start here.
+    /// Returns the transitions that start in this state.
     pub(crate) fn transitions(self) -> impl Iterator<Item = Transition> {
         TRANSITIONS.into_iter().filter(move |transition| transition.start == self)
     }
@@ -110,8 +110,8 @@ impl NodeState {
         [UNCONFIGURED, INACTIVE, ACTIVE, FINALIZED].contains(&self)
     }
 
-    /// Returns the transition from here for which a caller asks by its label, or by its number if the
-    /// label is empty: `ros2 service call` with a label alone sends the number 0.
+    /// Returns the transition from this state that a caller requests by its label, or by its ID if
+    /// the label is empty: `ros2 service call` with only a label sends the ID 0.
     pub(crate) fn asked_for(self, id: u8, label: &str) -> Option<Transition> {
         if !self.is_at_rest() {
             return None;
@@ -131,14 +131,14 @@ impl NodeState {
         self.transitions().find(|transition| transition.label == label)
     }
 
-    /// Returns the transition to the end of the node; `None` at the end.
+    /// Returns the transition on the way to the end of the node; `None` at the end.
     pub(crate) fn shutdown(self) -> Option<Transition> {
         self.transitions().find(|transition| transition.goal == SHUTTING_DOWN)
     }
 }
 
 impl Transition {
-    /// Returns true if the robot stands once the transition has begun.
+    /// Returns true if the robot is at rest once the transition has begun.
     pub(crate) fn stops(self) -> bool {
         [CLEANING_UP, DEACTIVATING, SHUTTING_DOWN].contains(&self.goal)
     }

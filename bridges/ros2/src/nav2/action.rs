@@ -1,11 +1,11 @@
-//! The action `FollowObject` as it lies on the wire.
+//! The action `FollowObject` in its serialised form.
 
 use std::fmt;
 
 use ros2_client::Message;
 use serde::{Deserialize, Serialize};
 
-/// Package of the action since it is part of Nav2.
+/// Package of the action in releases where it is part of Nav2.
 pub(crate) const NAV2: &str = "nav2_msgs";
 /// Package of the action for Humble, whose result has neither error code nor message.
 pub(crate) const HUMBLE: &str = "opennav_following_msgs";
@@ -33,7 +33,7 @@ pub(crate) struct FollowGoal {
 }
 
 impl FollowGoal {
-    /// Returns the goal to follow the poses of a topic until it is cancelled.
+    /// Returns a goal to follow the poses on a topic until it is cancelled.
     pub(crate) fn of_topic(pose_topic: &str) -> Self {
         let pose_topic = pose_topic.to_owned();
         Self { pose_topic, tracked_frame: String::new(), max_duration: Span::default() }

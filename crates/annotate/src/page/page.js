@@ -71,7 +71,7 @@ const change = (data) => {
       tell("");
     } catch (error) {
       const gone = error instanceof TypeError;
-      tell(gone ? "No answer: `tagalong annotate` does not run any more. All earlier changes are in the file." : error.message);
+      tell(gone ? "No answer: `tagalong annotate` has ended. All earlier changes are in the file." : error.message);
       show();
     }
   });
@@ -456,7 +456,7 @@ const begin = async () => {
   document.title = `Annotate ${about.log}`;
   byId("log").textContent = about.log;
   const origin = about.origin.charAt(0).toUpperCase() + about.origin.slice(1);
-  byId("origin").textContent = `${origin}; ${about.depth ? "depth fills in the places" : "no depth, so boxes only"}.`;
+  byId("origin").textContent = `${origin}; ${about.depth ? "depth gives the positions" : "no depth, so boxes only"}.`;
   byId("frame").max = about.frames.length - 1;
   byId("stage").style.aspectRatio = `${about.size[0]} / ${about.size[1]}`;
   byId("stage").style.setProperty("--shape", about.size[0] / about.size[1]);

@@ -1,4 +1,4 @@
-//! Depth image of a frame, reduced to what tells why nothing was proposed at a place.
+//! Depth image of a frame at low resolution, to explain why nothing was proposed at a position.
 
 use std::sync::Arc;
 
@@ -8,23 +8,23 @@ use tagalong_geometry::{Camera, Rect};
 use super::Rules;
 use crate::remedies::{number, sections};
 
-/// Columns and rows of cells.
+/// Number of columns and rows of cells.
 const COLUMNS: usize = 32;
 const ROWS: usize = 24;
 
-/// Readings of a cell in each direction.
+/// Number of readings of a cell along each axis.
 const TAPS: usize = 3;
 
-/// Units of a reading for a metre: a byte reaches to 25 m.
+/// Units of a reading per metre: a byte reaches 25 m.
 const UNITS: f32 = 10.0;
 
-/// Share of the cells of a box that must have depth.
+/// Minimum fraction of the cells of a box that must have depth.
 const LEAST_SHARE: f64 = 0.2;
 
-/// Part of a box, about its centre, in which the person is in front.
+/// Fraction of a box, about its centre, in which the person is in front.
 const CORE: f64 = 0.5;
 
-/// Depth image of a frame in coarse cells, with its camera. A copy shares the cells.
+/// Depth image of a frame in coarse cells, with its camera. Copies share the cells.
 #[derive(Clone, Debug)]
 pub struct Depths {
     /// Row by row, in tenths of a metre; 0 without a reading.
@@ -32,14 +32,14 @@ pub struct Depths {
     camera: Arc<Camera>,
 }
 
-/// Limit of a detector, and the line of the config with it.
+/// Limit of a detector, and its line in the config.
 struct Limit {
     value: f64,
     line: String,
 }
 
 impl Depths {
-    /// Reduces the depth image of a frame; `None` without one.
+    /// Reduces the depth image of a frame; `None` without a depth image.
     pub fn of_frame(frame: &Frame) -> Option<Self> {
         frame.depth().ok().map(|depth| Self::of(depth, &frame.camera))
     }
@@ -55,9 +55,9 @@ impl Depths {
     }
 
     /// Returns the name and the sentence of a cause that can be measured at a person without any
-    /// candidate. `None` if there is none, and where a detector needs no depth.
+    /// candidate. `None` if there is none, or if a detector needs no depth.
     pub(super) fn cause(&self, person: &Rect, rules: Rules<'_>) -> Option<(&'static str, String)> {
-        // A detector without such a limit looks at other things than depth.
+        // A detector without such a limit uses something other than depth.
         let least_m = limit(rules, "min_depth_m", f64::min)?;
         let most_m = limit(rules, "max_depth_m", f64::max)?;
         let Some(depth_m) = self.median_m(person) else {
@@ -110,7 +110,7 @@ impl Depths {
     }
 }
 
-/// Returns the median of a cell's readings, 0 if less than half of them are there.
+/// Returns the median of a cell's readings, 0 if fewer than half of them exist.
 fn cell(depth: &DepthImage, column: usize, row: usize) -> u8 {
     // An array instead of a vector saves an allocation per cell.
     let mut readings = [f32::INFINITY; TAPS * TAPS];
@@ -131,7 +131,7 @@ fn cell(depth: &DepthImage, column: usize, row: usize) -> u8 {
     (readings[count / 2] * UNITS).round().clamp(1.0, 255.0) as u8
 }
 
-/// Returns the limit of the detectors together, if all of them have it.
+/// Returns the common limit of the detectors, if all of them have it.
 fn limit(rules: Rules<'_>, key: &str, wider: fn(f64, f64) -> f64) -> Option<Limit> {
     let mut widest: Option<Limit> = None;
     for detector in sections(rules.config).filter(|section| section.name == "detectors") {
@@ -149,7 +149,8 @@ fn limit(rules: Rules<'_>, key: &str, wider: fn(f64, f64) -> f64) -> Option<Limi
 
 fn outside(words: &str, than: &str, limit: &Limit) -> String {
     format!(
-        "no detector proposed a candidate here: {words}, {than} than the detectors look; decided by {}",
+        "no detector proposed a candidate here: {words}, {than} than the detectors search; \
+         decided by {}",
         limit.line
     )
 }

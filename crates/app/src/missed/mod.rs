@@ -1,8 +1,9 @@
-//! Cause for which a person has no reported track in a frame. It is the one rule of the page of `view`,
-//! the report of `bench` and `doctor`, which all say the same sentence.
+//! Cause why a person has no reported track in a frame. The page of `view`, the report of `bench`
+//! and `doctor` all use this rule, and show the same sentence.
 //!
-//! A [`Witness`] keeps what a run says about each frame; [`find_missed`] looks there for each person that a
-//! comparison with the truth misses, and [`Witness::cause_at`] for any other place.
+//! A [`Witness`] records the results of a run for each frame; [`find_missed`] uses them for each
+//! person that a comparison with the truth misses, and [`Witness::cause_at`] for any other
+//! position.
 
 mod depths;
 mod witness;
@@ -21,20 +22,20 @@ use witness::{DroppedPlace, OF_SCORE};
 pub use depths::Depths;
 pub use witness::{SightedTrack, TrackStage, Witness};
 
-/// Test that a detection near a known person fails if that person has a better one. It says nothing
-/// about other people there.
+/// Test that a detection near a known person fails if that person has a better one. It gives no
+/// information about other people there.
 const NOT_BEST: &str = "not the best detection";
 
-/// Test that a track fails as long as its manager doubts it.
+/// Test that a track fails while its manager has not confirmed it.
 const NOT_CONFIRMED: &str = "track: not confirmed";
 
-/// End of the sentence about a track that is seen at a person whom the comparison misses.
-const BESIDE: &str = "is seen here, but too far beside the annotated person to count as found";
+/// End of the sentence about a track that is seen at a person that the comparison misses.
+const BESIDE: &str = "is seen here, but too far from the annotated person to count as found";
 
-/// Time after which the track that was on a person is not told any more, ns.
+/// Time after which the previous track of a person is no longer mentioned, ns.
 const RECENT_NS: i64 = 2_000_000_000;
 
-/// Returns true for a test that says something about the person where it dropped a candidate.
+/// Returns true for a test that gives information about the person where it dropped a candidate.
 pub fn is_telling(test: &str) -> bool {
     test != NOT_BEST
 }
@@ -48,42 +49,42 @@ pub struct Rules<'a> {
     pub config: &'a Table,
 }
 
-/// Person at a place, as far as it is known.
+/// Position of a person, as far as it is known.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PersonAt {
     /// Box of head and shoulders, pixels.
     pub rect: Option<Rect>,
-    /// Place on the floor, odometry frame, m.
+    /// Position on the floor, odometry frame, m.
     pub floor_m: Option<[f64; 2]>,
 }
 
-/// Track that was on a person before.
+/// Previous track of a person.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Former {
     id: i64,
     stamp_ns: i64,
 }
 
-/// Cause for which a person has no reported track.
+/// Cause why a person has no reported track.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cause {
-    /// Test that dropped the candidate at the person; none for other causes.
+    /// Test that dropped the candidate at the person; `None` for other causes.
     pub test: Option<String>,
     /// Name of the cause in a table: the test, or a few words.
     pub name: String,
     /// Box of that candidate, pixels: left, top, width, height.
     pub box_px: Option<[f64; 4]>,
-    /// Cause in a sentence, without the tracks and the candidate's value: the same for all people of one
-    /// name.
+    /// Cause as a sentence, without the tracks and the candidate's value: the same for all people
+    /// whose cause has the same name.
     pub why: String,
-    /// The whole sentence, with the value that was measured at this candidate.
+    /// The whole sentence, with the value that was measured for this candidate.
     pub text: String,
 }
 
 /// Person without a reported track in a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Missed {
-    /// Position of the frame in the sequence.
+    /// Index of the frame in the sequence.
     pub at: usize,
     /// ID of the person in the truth.
     pub person: i64,
@@ -91,8 +92,8 @@ pub struct Missed {
     pub cause: Cause,
 }
 
-/// Returns the people that count and have no track, frame by frame, each with the cause. The witness has
-/// the frames of the sequence by their numbers, from 1.
+/// Returns the people that count and have no track, frame by frame, each with the cause. The
+/// witness has the frames of the sequence by number, from 1.
 pub fn find_missed(
     sequence: &Sequence,
     prepared: &Prepared,
@@ -133,7 +134,7 @@ pub fn find_missed(
     all
 }
 
-/// Returns the sentences of causes, each once, and for each cause the position of its sentence.
+/// Returns the sentences of causes, each once, and for each cause the index of its sentence.
 pub fn sentences_of(missed: &[Missed]) -> (Vec<String>, Vec<usize>) {
     let mut sentences: Vec<String> = Vec::new();
     let mut known: BTreeMap<&str, usize> = BTreeMap::new();
@@ -149,8 +150,8 @@ pub fn sentences_of(missed: &[Missed]) -> (Vec<String>, Vec<usize>) {
 }
 
 impl Witness {
-    /// Returns the cause for which nobody is reported at a place. Tracks that are seen elsewhere and
-    /// overlap it in the image are other people.
+    /// Returns the cause why no person is reported at a position. Tracks that are seen at other
+    /// positions and overlap it in the image are other people.
     pub fn cause_at(&self, number: u64, place: &PersonAt, rules: Rules<'_>) -> Cause {
         let seen = self.tracks(number).iter().filter(|track| track.stage == TrackStage::Seen);
         let taken = seen.map(|track| i64::from(track.id)).collect();
@@ -198,8 +199,8 @@ impl Witness {
         Cause { text, ..cause }
     }
 
-    /// Returns the test that dropped the best candidate, else the values at the place; and the
-    /// sentence about this person alone.
+    /// Returns the test that dropped the best candidate, or otherwise the values at the position;
+    /// and the sentence for this person alone.
     fn dropped_or_measured(
         &self,
         number: u64,
@@ -229,7 +230,7 @@ impl Witness {
         (cause, own.unwrap_or(why))
     }
 
-    /// Returns the value that a candidate was dropped for, with its limits.
+    /// Returns the value because of which a candidate was dropped, with its limits.
     fn value_of(
         &self,
         number: u64,
@@ -242,14 +243,14 @@ impl Witness {
             value.limits.extend(least_score(rules.config));
         }
         let (_, limit) = value.limits.first()?;
-        // A verifier may judge after the manager did.
+        // A verifier may change the score after the manager has judged it.
         (!OF_SCORE.contains(&test) || value.value < *limit).then_some(value)
     }
 
-    /// Returns the candidate that came nearest to a track: one of the person's size before one that
-    /// merely overlaps the person, then by the test that it failed, the last one first, then by how far
-    /// its value is beyond the limit, and by the distance. Second detections of other people are left
-    /// out.
+    /// Returns the candidate that came closest to a track. One of the person's size has priority
+    /// over one that merely overlaps the person; then the order is by the test that it failed, the
+    /// last test first, by how far its value is beyond the limit, and by the distance. Duplicate
+    /// detections of other people are left out.
     fn best_dropped(
         &self,
         number: u64,
@@ -279,7 +280,7 @@ fn beyond(value: &MeasuredValue) -> f64 {
     value.limits.first().map_or(f64::INFINITY, |(_, limit)| (value.value - limit).abs())
 }
 
-/// Returns the least score of a candidate that starts a track, with the name of its setting.
+/// Returns the minimum score of a candidate that starts a track, with the name of its setting.
 fn least_score(config: &Table) -> Option<(String, f64)> {
     let manager = sections(config).find(|section| section.name == "manager")?;
     ["start_log_odds", "start_score"].into_iter().find_map(|key| {

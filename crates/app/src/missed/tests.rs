@@ -216,7 +216,7 @@ fn without_a_candidate_the_measured_cause_is_told() {
     assert_eq!(far.name, "too far");
     assert!(
         far.text.ends_with(
-            "the surface there is 6.2 m away, farther than the detectors look; decided by \
+            "the surface there is 6.2 m away, farther than the detectors search; decided by \
              detectors.0.config.max_depth_m = 5.0 (depth-template)."
         ),
         "{}",

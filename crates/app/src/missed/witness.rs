@@ -10,19 +10,19 @@ use tagalong_pipeline::FrameReport;
 use super::{Depths, PersonAt};
 use crate::frame_notes::{FateNote, FrameNotes, MeasuredValue};
 
-/// Largest factor between the widths of a person's box and of a candidate for that person.
+/// Maximum ratio between the widths of a person's box and of a candidate for that person.
 const SIMILAR: f64 = 2.0;
 
-/// Part of the smaller of two boxes that both have in common, from which a candidate is near a person:
-/// one on the chest has little of the box around head and shoulders. Tracks have more in common with
+/// Fraction of the smaller of two boxes that both must share for a candidate to be near a person:
+/// one on the chest shares little with the box around head and shoulders. Tracks share more with
 /// their persons.
 const NEAR_SHARE: f64 = 0.1;
 const NEAR_SHARE_OF_TRACK: f64 = 0.25;
 
-/// Overlap from which a candidate is another detection of a tracked person.
+/// Overlap from which on a candidate is another detection of a tracked person.
 const SAME_IOU: f64 = 0.5;
 
-/// Distance on the floor up to which a candidate or a track is near a person, m.
+/// Maximum distance on the floor at which a candidate or a track is near a person, m.
 const NEAR_M: f64 = 0.75;
 
 /// Tests of the score of a candidate, whose limit is in the config of the track manager.
@@ -31,16 +31,16 @@ pub(super) const OF_SCORE: [&str; 2] = ["score", "verifier"];
 /// State of a track in one frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TrackStage {
-    /// Confirmed, with evidence of this frame: it is reported.
+    /// Confirmed, with evidence in this frame: it is reported.
     Seen,
-    /// Confirmed, without evidence of this frame.
+    /// Confirmed, without evidence in this frame.
     Predicted,
     /// Not confirmed yet.
     Tentative,
 }
 
 impl TrackStage {
-    /// Returns the state of a track by its two signs.
+    /// Returns the state of a track from its two flags.
     pub fn of(confirmed: bool, seen: bool) -> Self {
         if !confirmed {
             Self::Tentative
@@ -55,26 +55,26 @@ impl TrackStage {
 /// Track in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SightedTrack {
-    /// Number of the track.
+    /// ID of the track.
     pub id: u32,
     /// State of the track.
     pub stage: TrackStage,
     /// Box of head and shoulders, pixels: left, top, width, height.
     pub box_px: [f32; 4],
-    /// Place on the floor, odometry frame, m.
+    /// Position on the floor, odometry frame, m.
     pub floor_m: [f32; 2],
 }
 
-/// Place at which a candidate was dropped.
+/// Position at which a candidate was dropped.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct DroppedPlace {
-    /// Position of the test in [`Witness::tests`].
+    /// Index of the test in [`Witness::tests`].
     test: u16,
     /// Left, top, width, height; single precision halves the memory of a long log.
     pub(super) box_px: [f32; 4],
-    /// Place on the floor, odometry frame, m; not finite where it is not known.
+    /// Position on the floor, odometry frame, m; not finite if it is not known.
     floor_m: [f32; 2],
-    /// Position of its value in [`Sight::measured`].
+    /// Index of its value in [`Sight::measured`].
     measured: Option<u16>,
 }
 
@@ -158,7 +158,7 @@ impl Witness {
         DroppedPlace { test, box_px, floor_m, measured: None }
     }
 
-    /// Returns a place of the robot frame in the odometry frame, as of a frame.
+    /// Converts a position in the robot frame to the odometry frame, at the time of a frame.
     pub(super) fn in_odom(&self, number: u64, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
         let [robot_x, robot_y, heading] = self.frames.get(&number)?.robot_odom;
         let (sin, cos) = heading.sin_cos();
@@ -183,7 +183,7 @@ impl Witness {
             .filter_map(|place| Some((self.tests.get(usize::from(place.test))?.as_str(), place)))
     }
 
-    /// Returns the value that a candidate was dropped for, if it is known.
+    /// Returns the value because of which a candidate was dropped, if it is known.
     pub(super) fn measured(&self, number: u64, dropped: &DroppedPlace) -> Option<&MeasuredValue> {
         self.frames.get(&number)?.measured.get(usize::from(dropped.measured?))
     }
@@ -206,8 +206,8 @@ impl Witness {
         })
     }
 
-    /// Returns the track at a place that is on no other person: a confirmed one first, then the
-    /// nearest.
+    /// Returns the track at a position that is on no other person; confirmed ones have priority,
+    /// then the nearest.
     pub(super) fn track_at(
         &self,
         number: u64,
@@ -238,17 +238,18 @@ impl SightedTrack {
     }
 }
 
-/// Nearness of a box to a person; of two the larger one is nearer.
+/// Closeness of a box to a person; of two values the larger one is closer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Nearness {
     /// Their boxes overlap.
     Overlaps,
-    /// Its centre is inside of the person's box, and it is of the person's size.
+    /// The centre of the box is inside of the person's box, and it is of the person's size.
     Fits,
 }
 
 impl DroppedPlace {
-    /// Returns the nearness to a person, and the distance; `None` for a place of another thing.
+    /// Returns the closeness to a person, and the distance; `None` for a position of something
+    /// else.
     pub(super) fn nearness(&self, person: &PersonAt) -> Option<(Nearness, f64)> {
         nearness(&self.box_px, &self.floor_m, person, NEAR_SHARE)
     }
@@ -259,8 +260,8 @@ fn rect_of(box_px: &[f32; 4]) -> Rect {
     Rect::new(x, y, width, height)
 }
 
-/// Compares boxes where the person has one, else places on the floor. Boxes that fit need no share in
-/// common.
+/// Compares boxes if the person has one, otherwise positions on the floor. Boxes that fit need not
+/// share an area.
 fn nearness(
     box_px: &[f32; 4],
     floor_m: &[f32; 2],

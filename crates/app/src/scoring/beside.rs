@@ -1,18 +1,19 @@
-//! Truth in a file beside its log: the forms that every command knows.
+//! Truth in a file beside its log: the formats that every command accepts.
 
 use std::path::{Path, PathBuf};
 
 use crate::suggest::LOG_ENDINGS;
 
-/// Form of a file of truth that is named after its log.
+/// Format of a file of truth that is named after its log.
 struct Form {
-    /// Ending of the file, in the place of that of the log.
+    /// Suffix of the file, which replaces the extension of the log.
     ending: &'static str,
     /// True if its boxes are of whole people.
     whole_bodies: bool,
 }
 
-/// Forms by precedence: where a log has several, boxes and heads count before places on the floor.
+/// Formats in order of precedence: if a log has several, boxes and heads have priority over
+/// positions on the floor.
 const FORMS: [Form; 4] = [
     Form { ending: "people.csv", whole_bodies: false },
     Form { ending: "truth.jsonl", whole_bodies: false },
@@ -20,8 +21,7 @@ const FORMS: [Form; 4] = [
     Form { ending: "people-floor.csv", whole_bodies: false },
 ];
 
-/// Returns the file with the truth of a log that is beside it; the flag is true if its boxes are of
-/// whole people.
+/// Returns the file with the truth beside a log; the flag is true if its boxes are of whole people.
 pub fn file_beside(log: &Path) -> Option<(PathBuf, bool)> {
     for form in &FORMS {
         let path = log.with_extension(form.ending);
@@ -32,18 +32,18 @@ pub fn file_beside(log: &Path) -> Option<(PathBuf, bool)> {
     None
 }
 
-/// Returns the file beside a log to which people are annotated by hand.
+/// Returns the file beside a log for people that are annotated by hand.
 pub fn annotated_file(log: &Path) -> PathBuf {
     log.with_extension(FORMS[0].ending)
 }
 
-/// Returns true if the boxes of a file are of whole people, by its ending.
+/// Returns true if the boxes of a file are of whole people, according to its suffix.
 pub fn is_of_whole_bodies(truth: &Path) -> bool {
     let name = truth.to_string_lossy();
     FORMS.iter().any(|form| form.whole_bodies && name.ends_with(&format!(".{}", form.ending)))
 }
 
-/// Returns the name of the log after which a file of truth is named, without its ending.
+/// Returns the name of the log after which a file of truth is named, without extension.
 pub fn log_of(truth: &str) -> Option<&str> {
     for form in &FORMS {
         let stem = truth.strip_suffix(form.ending).and_then(|stem| stem.strip_suffix('.'));
@@ -63,7 +63,7 @@ pub fn log_beside(truth: &Path) -> Option<PathBuf> {
     logs.find(|log| log.is_file())
 }
 
-/// Returns the files in which the truth of a log may be, as `a.people.csv, a.boxes.csv`.
+/// Returns the possible files for the truth of a log, as `a.people.csv, a.boxes.csv`.
 pub fn files_of(log: &Path) -> String {
     let files = FORMS.iter().map(|form| log.with_extension(form.ending).display().to_string());
     files.collect::<Vec<_>>().join(", ")

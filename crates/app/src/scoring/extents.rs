@@ -1,4 +1,4 @@
-//! Boxes of whole people and of upper bodies, told apart by their shape.
+//! Distinction of boxes of whole people and of upper bodies by their shape.
 
 use tagalong_eval::{MATCH_SIMILARITY, Region, Sequence};
 use tagalong_geometry::Rect;
@@ -6,15 +6,16 @@ use tagalong_geometry::Rect;
 use super::region;
 use super::truth::STANDING_HEIGHT_M;
 
-/// Height of boxes, in widths, up to which they are upper bodies, and from which they are whole
-/// people: squares, and boxes nearly three times as high as wide.
+/// Ratios of height to width: up to the first, boxes are those of upper bodies, and from the second
+/// on, those of whole people. Squares compare with boxes nearly three times as high as wide.
 const UPPER_MOST: f64 = 1.3;
 const WHOLE_LEAST: f64 = 1.7;
-/// Recall up to which nothing matches: a box that the image border cuts may match by chance.
+/// Recall up to which nothing counts as matched: a box that the image border cuts may match by
+/// chance.
 const NOTHING_MATCHES: f64 = 0.05;
 
-/// Returns the sequence with the upper bodies of its reports, and a note, if nothing matches because its
-/// truth is of upper bodies and its reports are of whole people.
+/// Returns the sequence with the upper bodies of its reports, and a note, if nothing matches
+/// because the truth has upper bodies and the reports are of whole people.
 pub fn as_upper_bodies(sequence: &Sequence) -> Option<(Sequence, String)> {
     let [truth, report] = aspects(sequence)?;
     if truth > UPPER_MOST || report < WHOLE_LEAST || !matches_nothing(sequence) {
@@ -29,29 +30,31 @@ pub fn as_upper_bodies(sequence: &Sequence) -> Option<(Sequence, String)> {
         });
     }
     let note = format!(
-        "nothing matches, and the boxes of the tracks are {report:.1} times as high as wide, those of \
-         the truth {truth:.1} times: compared are the upper bodies of the tracks, taken for people of \
-         {STANDING_HEIGHT_M} m who stand; tracks of upper bodies need no guess (`[output] boxes = \"upper\"`, \
-         and `body` of a detector other than \"full-box\")"
+        "nothing matches, and the boxes of the tracks are {report:.1} times as high as wide, those \
+         of the truth {truth:.1} times: the upper bodies of the tracks are compared, on the \
+         assumption of standing people of {STANDING_HEIGHT_M} m; tracks of upper bodies need no \
+         assumption (`[output] boxes = \"upper\"`, and `body` of a detector other than \
+         \"full-box\")"
     );
     Some((cut, note))
 }
 
-/// Returns a note if nothing matches because the truth is of whole people and the reports are of upper
-/// bodies: then the upper bodies of the truth are to be compared.
+/// Returns a note if nothing matches because the truth has whole people and the reports are of
+/// upper bodies: then the upper bodies of the truth should be compared.
 pub fn whole_bodies_in_truth(sequence: &Sequence) -> Option<String> {
     let [truth, report] = aspects(sequence)?;
     if truth < WHOLE_LEAST || report > UPPER_MOST || !matches_nothing(sequence) {
         return None;
     }
     Some(format!(
-        "nothing matches, and the boxes of the truth are {truth:.1} times as high as wide, those of the \
-         tracks {report:.1} times: compared are the upper bodies of the truth, as with --upper-body; \
-         `[output] boxes = \"full\"` makes tracks of whole people"
+        "nothing matches, and the boxes of the truth are {truth:.1} times as high as wide, those \
+         of the tracks {report:.1} times: the upper bodies of the truth are compared, as with \
+         --upper-body; `[output] boxes = \"full\"` makes tracks of whole people"
     ))
 }
 
-/// Returns the usual aspects of the boxes of truth and reports; `None` if either has no box.
+/// Returns the typical aspect ratios of the boxes in truth and reports; `None` if either has no
+/// box.
 fn aspects(sequence: &Sequence) -> Option<[f64; 2]> {
     let truths = sequence.frames.iter().flat_map(|frame| &frame.truths);
     let reports = sequence.frames.iter().flat_map(|frame| &frame.reports);
@@ -60,7 +63,7 @@ fn aspects(sequence: &Sequence) -> Option<[f64; 2]> {
     Some([truth, report])
 }
 
-/// Returns true if hardly a person of the truth has a report on it.
+/// Returns true if almost no person of the truth has a matching report.
 fn matches_nothing(sequence: &Sequence) -> bool {
     let mut people = 0;
     let mut found = 0;
@@ -75,7 +78,7 @@ fn matches_nothing(sequence: &Sequence) -> bool {
     found as f64 <= NOTHING_MATCHES * people as f64
 }
 
-/// Returns the median of the heights of boxes in their widths.
+/// Returns the median ratio of height to width of boxes.
 fn median_aspect(regions: impl Iterator<Item = Region>) -> Option<f64> {
     let mut aspects: Vec<f64> =
         regions.filter(Region::has_area).map(|region| region.height / region.width).collect();

@@ -1,13 +1,13 @@
-//! Tracks whose numbers mean something else than a reader takes them for: frames that begin with 0, and
-//! boxes by two corners.
+//! Tracks whose numbers probably have another meaning than the one assumed: frames that begin with
+//! 0, and boxes given by two corners.
 
 use tagalong_eval::{Comparison, Frame, Hota, HotaLevel, PairTable, Prepared, Region, Sequence};
 
-/// Least gain in HOTA that another reading has to bring to be suggested.
+/// Minimum gain in HOTA for another reading to be suggested.
 const LEAST_GAIN: f64 = 0.05;
 
-/// Returns suggestions for tracks that fit much better if their frames are numbered from elsewhere, or if
-/// their boxes are two corners.
+/// Returns suggestions for tracks that fit much better if their frames are numbered from another
+/// start, or if their boxes are two corners.
 pub fn misread_notes(sequence: &Sequence, comparison: &Comparison) -> Vec<String> {
     let Some(as_read) = hota(sequence, comparison) else { return Vec::new() };
     let readings = [
@@ -42,7 +42,8 @@ fn hota(sequence: &Sequence, comparison: &Comparison) -> Option<f64> {
     Some(Hota::measure(&prepared, &table).mean(HotaLevel::hota))
 }
 
-/// Returns the sequence with the reports of each frame in the next one, or in the one before.
+/// Returns the sequence with the reports of each frame moved to the next one, or to the previous
+/// one.
 fn moved(sequence: &Sequence, by: i64) -> Option<Sequence> {
     let mut frames: Vec<Frame> = sequence.frames.clone();
     for (at, frame) in (0_i64..).zip(&mut frames) {
@@ -52,8 +53,8 @@ fn moved(sequence: &Sequence, by: i64) -> Option<Sequence> {
     Some(Sequence { name: sequence.name.clone(), frames })
 }
 
-/// Returns the sequence with the sizes of boxes read as their lower right corners; `None` if some box
-/// cannot be meant so.
+/// Returns the sequence with the sizes of boxes interpreted as their lower right corners; `None` if
+/// that is impossible for some box.
 fn by_corners(sequence: &Sequence) -> Option<Sequence> {
     let mut read = sequence.clone();
     let reports = read.frames.iter_mut().flat_map(|frame| &mut frame.reports);

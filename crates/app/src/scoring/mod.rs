@@ -32,10 +32,10 @@ pub type Reports = BTreeMap<u32, Vec<Report>>;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rate(pub f64);
 
-/// Puts truth and reports of all frames side by side.
+/// Combines truth and reports of all frames.
 ///
-/// Frames that the log has but did not deliver (their depth was lost, say) are included: the people
-/// in them were missed.
+/// Frames that the log has but did not deliver (for example because their depth was lost) are
+/// included: the people in them were missed.
 pub fn assemble(
     name: &str,
     truth: &TruthFile,
@@ -59,12 +59,13 @@ pub fn assemble(
 }
 
 /// Returns the part of a sequence that a similarity can compare: reports without the compared
-/// quantity are left out, as are people without a box where boxes are compared; `None` if the truth
+/// quantity are left out, as are people without a box if boxes are compared. `None` if the truth
 /// lacks positions, or has no boxes at all.
 pub fn comparable(sequence: &Sequence, similarity: Similarity) -> Option<Sequence> {
     let mut truths = sequence.frames.iter().flat_map(|frame| &frame.truths);
     let is_comparable = match similarity {
-        // Without people in the truth every report is a false positive: still comparable.
+        // Without people in the truth every report is a false positive, which can still be
+        // compared.
         Similarity::Iou => {
             truths.clone().next().is_none() || truths.any(|truth| has_place(truth, similarity))
         }
@@ -81,7 +82,7 @@ pub fn comparable(sequence: &Sequence, similarity: Similarity) -> Option<Sequenc
     is_comparable.then_some(kept)
 }
 
-/// Whether a person of the truth has the box or the place that is compared.
+/// Returns true if a person of the truth has the box or the position that is compared.
 fn has_place(truth: &Truth, similarity: Similarity) -> bool {
     match similarity {
         Similarity::Iou => truth.region.is_some(),
@@ -89,7 +90,7 @@ fn has_place(truth: &Truth, similarity: Similarity) -> bool {
     }
 }
 
-/// Returns the sentence of an error of a truth or of tracks, with the option that cures it.
+/// Returns the sentence for an error in a truth or in tracks, with the option that solves it.
 pub fn with_remedy(error: &EvalError) -> String {
     match error {
         EvalError::DuplicateId { side: "truth", .. } => {
@@ -99,7 +100,7 @@ pub fn with_remedy(error: &EvalError) -> String {
     }
 }
 
-/// Returns the comparison that the truth's protocol asks for.
+/// Returns the comparison that the truth's protocol requires.
 pub fn comparison(truth: &TruthFile, similarity: Similarity) -> Comparison {
     if truth.is_kitti() && similarity == Similarity::Iou {
         kitti::comparison(similarity)
@@ -108,7 +109,7 @@ pub fn comparison(truth: &TruthFile, similarity: Similarity) -> Comparison {
     }
 }
 
-/// Returns a note on the boxes of a file, each with its line, that have no area, if any.
+/// Returns a note on boxes of a file that have no area, each with its line, if there are any.
 fn without_area<'a>(
     name: &str,
     boxes: impl Iterator<Item = (usize, &'a Region)>,
@@ -117,13 +118,13 @@ fn without_area<'a>(
         |OddLines { count, first, of }| {
             format!(
                 "{name}: {count} of {of} boxes have no area (the first in line {first}); as in \
-                 TrackEval they match nobody"
+                 TrackEval they match no person"
             )
         },
     )
 }
 
-/// Returns notes on KITTI labels that may be read in another way than intended.
+/// Returns notes on KITTI labels that may have another meaning than intended.
 fn odd_labels(name: &str, labels: &[kitti::Label]) -> Vec<String> {
     let anonymous = OddLines::among(labels.iter().map(|label| (label.line, label.is_anonymous())));
     let left_out = anonymous.map(|OddLines { count, first, of }| {
@@ -139,14 +140,14 @@ fn odd_labels(name: &str, labels: &[kitti::Label]) -> Vec<String> {
 /// Reads a text file.
 ///
 /// # Errors
-/// A file that cannot be read, by name.
+/// A file that cannot be read, with its name.
 pub fn read_text(path: &Path) -> Result<String, Failure> {
     let shown = path.display();
     read_bounded(path, FileLimit::Table).map_err(|error| {
         Failure::failed(match error.kind() {
             ErrorKind::InvalidData => format!(
-                "{shown} is no text; truth and tracks are MOTChallenge, KITTI or CSV text, a log, or \
-                 the folder of a run"
+                "{shown} is not text; truth and tracks are MOTChallenge, KITTI or CSV text, a log, \
+                 or the folder of a run"
             ),
             ErrorKind::NotFound => format!("{shown}: no such file{}", file_hint(path)),
             _ => format!("cannot read {shown}: {error}"),

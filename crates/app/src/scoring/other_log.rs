@@ -1,23 +1,24 @@
-//! Signs that a truth is that of another log than the frames beside it.
+//! Signs that a truth belongs to another log than the frames.
 
 use std::path::Path;
 
 use super::beside::log_of;
 use super::{Shots, TruthFile};
 
-/// Endings of other truth that is named after its log.
+/// Suffixes of other truth files that are named after their log.
 const OTHER_ENDINGS: [&str; 3] = [".jsonl", ".mcap", ".bag"];
-/// Number of frames that a truth may go on behind the last one that the log gave: images at the end may
-/// have lost their depth.
+/// Number of frames by which a truth may extend beyond the last frame of the log, because images at
+/// the end may have lost their depth.
 const BEYOND: u32 = 5;
-/// Part of the boxes that lie outside of the image, by their middles, from which on it is another image.
+/// Fraction of the boxes with centres outside of the image from which on they belong to another
+/// image.
 const OUTSIDE: f64 = 0.2;
-/// Share of the annotated people below which the truth may be that of another log: by chance a few of
-/// its boxes lie on tracks.
+/// Fraction of the annotated people below which the truth may belong to another log: by chance a
+/// few of its boxes match tracks.
 const BY_CHANCE: f64 = 0.1;
 
-/// Returns the notes on a truth beside the frames of a log: the signs that it is that of another one, and
-/// people that end far before the log does.
+/// Returns notes on a truth and the frames of a log: the signs that the truth belongs to another
+/// log, and people that end long before the log does.
 pub fn truth_notes(
     path: &Path,
     truth: &TruthFile,
@@ -29,8 +30,8 @@ pub fn truth_notes(
     notes
 }
 
-/// Returns the question that a truth raises if tracks match only `matched` of its `people`, over all
-/// frames, or none.
+/// Returns the question whether the truth is the right one, if tracks match only `matched` of its
+/// `people`, over all frames, or none.
 pub fn match_note(path: &Path, people: u64, matched: u64, reports: u64) -> Option<String> {
     if reports == 0 || matched as f64 >= BY_CHANCE * people as f64 {
         return None;
@@ -47,9 +48,9 @@ fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Returns notes with the signs that a truth is that of another log: its name, its number of frames, its
-/// stamps, and the size of the image in which its boxes lie. `log_name` is the file name of the log, if it
-/// is known; of `shots` there are none where no log was read.
+/// Returns notes with the signs that a truth belongs to another log: its name, its number of
+/// frames, its stamps, and the size of the image that contains its boxes. `log_name` is the file
+/// name of the log, if it is known; `shots` is empty if no log was read.
 pub fn other_log_notes(
     path: &Path,
     truth: &TruthFile,
@@ -77,7 +78,7 @@ fn is_of_other_times(truth: &TruthFile, without: usize) -> bool {
     truth.needs_stamps() && 2 * without > truth.annotated()
 }
 
-/// Returns the sign of a truth that is named after another log.
+/// Returns the sign that a truth is named after another log.
 fn by_name(name: &str, truth: &TruthFile, log: &str) -> Option<String> {
     let of_truth = log_of(name)
         .or_else(|| OTHER_ENDINGS.iter().find_map(|ending| name.strip_suffix(ending)))?;
@@ -86,7 +87,7 @@ fn by_name(name: &str, truth: &TruthFile, log: &str) -> Option<String> {
     is_other.then(|| format!("{name} is named after {of_truth}, and the run is of {log}"))
 }
 
-/// Returns the sign of people in frames, or at stamps, that the log does not have.
+/// Returns the sign that people are in frames, or at stamps, that the log does not have.
 fn by_frames(name: &str, truth: &TruthFile, shots: &Shots) -> Option<String> {
     shots.first()?;
     if truth.needs_stamps() {
@@ -102,11 +103,12 @@ fn by_frames(name: &str, truth: &TruthFile, shots: &Shots) -> Option<String> {
     })
 }
 
-/// Returns the sign of boxes in an image of another size.
+/// Returns the sign that boxes belong to an image of another size.
 fn by_image(name: &str, truth: &TruthFile, shots: &Shots) -> Option<String> {
     let camera = &shots.first()?.camera;
     let size = [camera.width as f64, camera.height as f64];
-    // Boxes may be those of the raw image of a mirror, and the camera that of the unwrapped one.
+    // The boxes may be those of the raw image of a mirror, while the camera is that of the
+    // unwrapped one.
     if camera.is_blind() || camera.panorama().is_some() {
         return None;
     }

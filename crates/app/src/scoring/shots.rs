@@ -11,9 +11,9 @@ use super::Rate;
 /// Time and pose of a frame of a log.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shot {
-    /// Number of the colour image, from 1.
+    /// Index of the colour image, from 1.
     pub number: u32,
-    /// Its stamp, ns.
+    /// Stamp of the image, ns.
     pub stamp_ns: u64,
     /// The camera, with its pose in the robot frame.
     pub camera: Arc<Camera>,
@@ -38,8 +38,8 @@ impl Shot {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Shots {
     shots: Vec<Shot>,
-    /// Stamps that never run backwards, ns since the first: after a jump back of the clock the time
-    /// goes on with one millisecond.
+    /// Stamps that never decrease, ns since the first: after a backward jump of the clock the time
+    /// continues with one millisecond.
     elapsed_ns: Vec<i64>,
 }
 
@@ -49,7 +49,7 @@ impl Shots {
     /// # Errors
     /// A log that cannot be used.
     pub fn read(path: &Path, input: &InputSettings, limits: &Limits) -> Result<Self, Failure> {
-        // The right image would add nothing but the time to decode it.
+        // The right image would only cost time for decoding.
         let inputs = Inputs::ANY.without(Input::Right);
         let mut source = FrameSource::open(path, input, limits, inputs)?;
         let mut shots = Self::default();
@@ -77,7 +77,7 @@ impl Shots {
         self.shots.first()
     }
 
-    /// Returns all frames, in their order.
+    /// Returns all frames in order.
     pub fn iter(&self) -> impl Iterator<Item = &Shot> {
         self.shots.iter()
     }
@@ -93,14 +93,14 @@ impl Shots {
         self.shots.get(after.saturating_sub(1))
     }
 
-    /// Returns the frame with the nearest stamp, if that is no farther away than `within_ns`.
+    /// Returns the frame with the nearest stamp, if the difference is at most `within_ns`.
     pub fn near(&self, stamp_ns: u64, within_ns: u64) -> Option<&Shot> {
         let nearest = self.shots.iter().min_by_key(|shot| shot.stamp_ns.abs_diff(stamp_ns))?;
         (nearest.stamp_ns.abs_diff(stamp_ns) <= within_ns).then_some(nearest)
     }
 
-    /// Returns the time of a frame since the first one, ns; frames that were not delivered are
-    /// interpolated, and without a log all frames are spaced by `rate`.
+    /// Returns the time of a frame since the first one, ns. Frames that were not delivered are
+    /// interpolated; without a log all frames are spaced by `rate`.
     pub fn stamp_ns(&self, number: u32, rate: Rate) -> i64 {
         let after = self.shots.partition_point(|shot| shot.number < number);
         let before = after.checked_sub(1).and_then(|index| self.number_and_time(index));
@@ -114,7 +114,7 @@ impl Shots {
         }
     }
 
-    /// The number of a shot, and its time since the first one.
+    /// Returns the number of a shot, and its time since the first one.
     fn number_and_time(&self, index: usize) -> Option<(i64, i64)> {
         Some((i64::from(self.shots.get(index)?.number), *self.elapsed_ns.get(index)?))
     }
@@ -125,7 +125,7 @@ impl Shots {
         let last = self.shots.last();
         let steps = last.map_or(0, |l| l.number) - first.map_or(0, |f| f.number);
         let elapsed = self.elapsed_ns.last().copied().unwrap_or(0);
-        // A single frame has no spacing; 10 Hz is assumed.
+        // A single frame has no spacing, so 10 Hz is assumed.
         if steps > 0 { (elapsed / i64::from(steps)).max(1) } else { 100_000_000 }
     }
 

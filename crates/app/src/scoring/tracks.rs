@@ -10,22 +10,22 @@ use tagalong_eval::formats::{Timeline, kitti, metres, mot};
 
 use super::{Reports, odd_labels, read_text, without_area};
 
-/// Tracks as a tracker wrote them.
+/// Tracks as written by a tracker.
 #[derive(Clone, Debug, Default)]
 pub struct Tracks {
     /// Reports by the number of the frame.
     pub reports: Reports,
-    /// Name of the log of a run, if the tracks are those of a run.
+    /// Name of the log, if the tracks are those of a run.
     pub log_name: Option<String>,
-    /// Place of that log, as the run names it, where it still is.
+    /// Path of that log according to the run, if it still exists.
     pub log_path: Option<PathBuf>,
     /// True if positions are in the robot frame.
     pub in_robot_frame: bool,
-    /// Notes on lines that may have been read in another way than intended.
+    /// Notes on lines that may have another meaning than intended.
     pub notes: Vec<String>,
 }
 
-/// Part of a run's `report.json` that is used.
+/// The used part of a run's `report.json`.
 #[derive(Deserialize)]
 struct RunFacts {
     log: LogName,
@@ -33,7 +33,7 @@ struct RunFacts {
     ended: String,
 }
 
-/// End of a run that was not stopped, in its report.
+/// Returns the end of a run that was not stopped, as in its report.
 fn complete() -> String {
     "complete".into()
 }
@@ -48,12 +48,13 @@ impl Tracks {
     /// `length` is the number of frames in the sequence, if that is known.
     ///
     /// # Errors
-    /// A file that cannot be read, or that TrackEval would refuse; names the file and the line.
+    /// A file that cannot be read, or that TrackEval would reject; with the name of the file and
+    /// the line.
     pub fn read(path: &Path, length: Option<u32>) -> Result<Self, Failure> {
         if path.is_dir() {
             return Self::of_run(path, length);
         }
-        // A file in the folder of a run is of the log of that run.
+        // A file in the folder of a run belongs to the log of that run.
         if let Some(run) = path.parent().filter(|folder| is_run(folder)) {
             return Self::of_file(path, length)?.with_facts(run);
         }
@@ -66,7 +67,7 @@ impl Tracks {
         let first = text.lines().next().unwrap_or_default();
         if ["ub_x", "head_x"].iter().any(|column| first.contains(column)) {
             return Err(Failure::usage(format!(
-                "{name} is a truth, and no tracks: name it as --truth"
+                "{name} is a truth, not tracks: name it as --truth"
             )));
         }
         // Of all formats, only `tracks-metres.csv` begins with this column.
@@ -91,7 +92,7 @@ impl Tracks {
         Ok(Self { reports, notes: notes.into_iter().collect(), ..Self::default() })
     }
 
-    /// Reads KITTI labels. Their frames count from 0, those of all other formats from 1.
+    /// Reads KITTI labels. Their frames start at 0, those of all other formats at 1.
     fn of_kitti(text: &str, name: &str) -> Result<Self, Failure> {
         let labels = kitti::parse(text, name).map_err(Failure::failed)?;
         let mut timeline = Timeline::new();
@@ -117,7 +118,7 @@ impl Tracks {
         Self { in_robot_frame: true, ..tracks }.with_facts(folder)
     }
 
-    /// Adds the facts that the folder of a run has: its log, and a note if it is not whole.
+    /// Adds the information from the folder of a run: its log, and a note if it is incomplete.
     fn with_facts(mut self, folder: &Path) -> Result<Self, Failure> {
         let path = folder.join("report.json");
         let text = read_text(&path)?;
@@ -125,7 +126,8 @@ impl Tracks {
             .map_err(|error| Failure::failed(format!("{}: {error}", path.display())))?;
         if facts.ended != complete() {
             self.notes.push(format!(
-                "{}: the run is not whole ({}); the frames after its end count as frames without tracks",
+                "{}: the run is incomplete ({}); the frames after its end count as frames without \
+                 tracks",
                 folder.display(),
                 facts.ended
             ));
@@ -134,14 +136,14 @@ impl Tracks {
     }
 }
 
-/// Returns the path of the log of a run, a file or the folder of a recording, if it is there.
+/// Returns the path of the log of a run, a file or the folder of a recording, if it exists.
 fn log_of(run: &Path) -> Option<PathBuf> {
     let text = read_text(&run.join("origin.json")).ok()?;
     let origin: Origin = serde_json::from_str(&text).ok()?;
     (!origin.log.as_os_str().is_empty() && origin.log.exists()).then_some(origin.log)
 }
 
-/// The text of a file, and the file's name for messages.
+/// Returns the text of a file, and its name for messages.
 fn text_and_name(path: PathBuf) -> Result<(String, String), Failure> {
     Ok((read_text(&path)?, path.display().to_string()))
 }
@@ -160,7 +162,7 @@ fn gather(rows: impl IntoIterator<Item = (u32, Report)>) -> Reports {
     reports
 }
 
-/// Returns the positions of the seen tracks: `tracks.csv` has boxes of these alone.
+/// Returns the positions of the seen tracks, because `tracks.csv` only has boxes of these.
 fn places(text: &str, name: &str, length: Option<u32>) -> Result<Reports, Failure> {
     let rows = metres::parse(text, name).map_err(Failure::failed)?;
     if let Some(length) = length {

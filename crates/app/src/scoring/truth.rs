@@ -14,31 +14,31 @@ use tagalong_log::{Limits, TRUTH_TOPIC, TruthFrame, TruthPerson, read_truth, rea
 use super::beside::file_beside;
 use super::{Shots, odd_labels, read_text, region, without_area};
 
-/// Largest difference between the stamps of an image and its truth in a log, ns.
+/// Maximum difference between the stamps of an image and its truth in a log, ns.
 const SAME_MOMENT_NS: u64 = 5_000_000;
 
-/// Number of frames, and part of all frames, after the last person of a truth beyond which it may be
-/// unfinished.
+/// Number of frames, and fraction of all frames, after the last person of a truth beyond which it
+/// may be unfinished.
 const EARLY_FRAMES: u32 = 10;
 const EARLY_PART: f64 = 0.2;
 
 /// Assumed height of a person in a whole-body box, m.
 pub const STANDING_HEIGHT_M: f64 = 1.7;
 
-/// People in a frame, and its regions without annotation.
+/// People in a frame, and the regions of the frame without annotation.
 pub type People = (Vec<Truth>, Vec<Region>);
 
 /// Rules for reading MOTChallenge truth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum RulesChoice {
-    /// MOT17 if all boxes have a class of it, MOT15 if none has; a mixture is refused.
+    /// MOT17 if all boxes have a class of it, MOT15 if none has; a mixture is rejected.
     #[default]
     Auto,
-    /// No classes; confidence 0 does not count.
+    /// No classes; boxes with confidence 0 do not count.
     Mot15,
     /// Pedestrians count, distractors are ignored.
     Mot17,
-    /// As MOT17, and bicycles are ignored, too.
+    /// As MOT17, but bicycles are ignored as well.
     Mot20,
 }
 
@@ -47,22 +47,22 @@ pub enum RulesChoice {
 pub struct TruthOptions {
     /// Rules of MOTChallenge text.
     pub rules: RulesChoice,
-    /// True if the caller has an option `--rules`: an error about rules names it.
+    /// True if the caller has an option `--rules`, which an error about rules then names.
     pub takes_rules: bool,
-    /// True if boxes are of whole people: their upper bodies are compared.
+    /// True if boxes enclose whole people: then their upper bodies are compared.
     pub upper_body: bool,
-    /// True if the first of several people with one ID in a frame is kept, and the others are left out
-    /// and counted.
+    /// True if only the first of several people with the same ID in a frame is kept, and the others
+    /// are removed and counted.
     pub drops_doubled_ids: bool,
 }
 
-/// Position of a person, as far as the file has one.
+/// Position of a person, if the file has one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum TruthPosition {
     Unknown,
     /// Surface of the head in the colour optical frame, m.
     HeadInCamera([f64; 3]),
-    /// On the floor in the frame of the tracks, m.
+    /// Position on the floor in the frame of the tracks, m.
     Floor([f64; 2]),
 }
 
@@ -78,7 +78,7 @@ enum Kind {
     Lines,
 }
 
-/// Frame as annotated; the key of the map is its number, or its stamp.
+/// Annotated frame; the key of the map is its number, or its stamp.
 #[derive(Clone, Debug, Default)]
 struct Annotated {
     people: Vec<(Truth, TruthPosition)>,
@@ -90,22 +90,22 @@ struct Annotated {
 pub struct TruthFile {
     kind: Kind,
     frames: BTreeMap<u64, Annotated>,
-    /// True if its boxes are cut to upper bodies.
+    /// True if its boxes are reduced to upper bodies.
     whole_bodies: bool,
     /// The `seqinfo.ini` beside it.
     pub info: Option<SequenceInfo>,
-    /// Rules that its rows were read with, if it is MOTChallenge text.
+    /// Rules with which its rows were read, if it is MOTChallenge text.
     pub rules: Option<mot::Rules>,
-    /// Notes on lines that may have been read in another way than intended.
+    /// Notes on lines that may have another meaning than intended.
     pub notes: Vec<String>,
 }
 
 impl TruthFile {
     /// Finds the file with the truth of a log, beside it or the log itself; the flag is true if its
-    /// boxes are of whole people.
+    /// boxes enclose whole people.
     ///
     /// # Errors
-    /// A log without a file beside it that cannot be read.
+    /// A log that cannot be read, if there is no file beside it.
     pub fn beside(log: &Path) -> Result<Option<(PathBuf, bool)>, Failure> {
         // Files beside the log take precedence, so that they can replace the log's own truth.
         if let Some(found) = file_beside(log) {
@@ -117,12 +117,13 @@ impl TruthFile {
     /// Reads truth of any format.
     ///
     /// # Errors
-    /// A file that cannot be read; names the file and the line.
+    /// A file that cannot be read; with the name of the file and the line.
     pub fn read(path: &Path, options: TruthOptions) -> Result<Self, Failure> {
         if is_run(path) || is_of_run(path) {
             let shown = path.display();
             return Err(Failure::usage(format!(
-                "{shown} is that which a run found, and no truth: perhaps --truth and --tracks are swapped"
+                "{shown} was written by a run, and is not a truth: perhaps --truth and --tracks \
+                 are swapped"
             )));
         }
         let mut truth = match kind_of(path)? {
@@ -148,12 +149,12 @@ impl TruthFile {
         }
         if dropped > 0 {
             self.notes.push(format!(
-                "{name}: {dropped} people are left out, whose ID the frame has already"
+                "{name}: {dropped} people are left out, because the frame has their ID already"
             ));
         }
     }
 
-    /// Returns a note if the people of the truth end far before its frames do, as far as a file or the
+    /// Returns a note if the people of the truth end long before its frames do, if a file or the
     /// log states their number.
     pub fn early_end(&self, name: &str, shots: &Shots) -> Option<String> {
         let (length, stated) = match &self.info {
@@ -186,7 +187,7 @@ impl TruthFile {
         let name = path.display().to_string();
         let rules = match options.rules {
             RulesChoice::Auto => mot::Rules::of_truth(&text, &name).map_err(|error| {
-                // Rows that no rules can read are refused by the same function.
+                // Rows that no rules can read are rejected by the same function.
                 let is_of_rules = error.why.contains("rules");
                 let remedy = if !is_of_rules {
                     ""
@@ -230,7 +231,7 @@ impl TruthFile {
         Ok(file)
     }
 
-    /// Reads people in laser scans. Scans count from 0, frames from 1.
+    /// Reads people in laser scans. Scans start at 0, frames at 1.
     fn of_floor(path: &Path) -> Result<Self, Failure> {
         let text = read_text(path)?;
         let rows = floor::parse(&text, &path.display().to_string()).map_err(Failure::failed)?;
@@ -238,14 +239,14 @@ impl TruthFile {
         for row in rows {
             let role = if row.ignore { Role::Ignored } else { Role::Counts };
             let truth = Truth { id: row.person.id, role, ..Truth::default() };
-            // A run takes a scanner that tf does not place to be at the robot's origin.
+            // A run assumes that a scanner without a pose in tf is at the robot's origin.
             let place = TruthPosition::Floor(row.robot_m.unwrap_or(row.person.at_m));
             file.add(u64::from(row.scan) + 1, truth, place);
         }
         Ok(file)
     }
 
-    /// Reads KITTI labels. Their frames count from 0, those of all other formats from 1.
+    /// Reads KITTI labels. Their frames start at 0, those of all other formats at 1.
     fn of_kitti(path: &Path) -> Result<Self, Failure> {
         let text = read_text(path)?;
         let name = path.display().to_string();
@@ -282,8 +283,8 @@ impl TruthFile {
         file
     }
 
-    /// Makes the people of these frames neither missed nor found: their boxes become regions
-    /// without annotation.
+    /// Excludes the people of these frames from scoring: their boxes become regions without
+    /// annotation.
     #[must_use]
     pub fn without_judging(mut self, frames: &[u32]) -> Self {
         for number in frames {
@@ -305,7 +306,7 @@ impl TruthFile {
         people.any(|(_, place)| matches!(place, TruthPosition::HeadInCamera(_)))
     }
 
-    /// Returns true if frames are identified by stamps: only the log knows their numbers.
+    /// Returns true if frames are identified by stamps, so that only the log knows their numbers.
     pub fn needs_stamps(&self) -> bool {
         matches!(self.kind, Kind::Log | Kind::Lines)
     }
@@ -322,7 +323,7 @@ impl TruthFile {
         stated.max(annotated.unwrap_or(0))
     }
 
-    /// Returns the number of the last frame with an entry; `None` without any.
+    /// Returns the number of the last frame with an entry; `None` without entries.
     pub fn last_annotated(&self, shots: &Shots) -> Option<u32> {
         self.frames.keys().filter_map(|key| self.number(*key, shots)).next_back()
     }
@@ -350,9 +351,9 @@ impl TruthFile {
         }
     }
 
-    /// Returns the box of a person that is compared with those of tracks. The upper body of a
-    /// person whose feet are in the image is where the floor says, crouching or upright; that of
-    /// others is that of a standing person.
+    /// Returns the box of a person that is compared with those of tracks. If the feet of a person
+    /// are in the image, the position of the upper body follows from the floor, whether crouching
+    /// or upright; otherwise it is that of a standing person.
     fn compared(&self, annotated: Region, camera: Option<&Camera>) -> Region {
         if !self.whole_bodies {
             return annotated;
@@ -366,7 +367,7 @@ impl TruthFile {
         region(&on_floor.unwrap_or_else(|| whole.upper_body_of_standing(STANDING_HEIGHT_M)))
     }
 
-    /// Returns the people by the number of the frame, on the floor where that is possible.
+    /// Returns the people by the number of the frame, with positions on the floor if possible.
     pub fn frames(&self, shots: &Shots) -> BTreeMap<u32, People> {
         let mut all = BTreeMap::new();
         for (key, frame) in &self.frames {
@@ -393,7 +394,7 @@ impl TruthPosition {
             Self::HeadInCamera(surface) => {
                 let surface = Point3::from(surface);
                 let ray = surface.coords.try_normalize(1e-6)?;
-                // Depth sees the surface; tracks estimate the centre of the head.
+                // Depth measures the surface, but tracks estimate the centre of the head.
                 let centre = surface + ray * HEAD_RADIUS_M;
                 let head = robot_from_camera? * centre;
                 Some([head.x, head.y])
@@ -402,7 +403,7 @@ impl TruthPosition {
     }
 }
 
-/// Returns a note on boxes of a truth that a pipeline proposed, before their review.
+/// Returns a note on boxes of a truth that a pipeline proposed and that have not been reviewed.
 fn proposed_note(name: &str, rows: &[people::Row]) -> Option<String> {
     let proposed = rows.iter().filter(|row| !row.proposed.is_empty());
     let proposers: BTreeSet<&str> = proposed.clone().map(|row| row.proposed.as_str()).collect();
@@ -410,8 +411,8 @@ fn proposed_note(name: &str, rows: &[people::Row]) -> Option<String> {
     let proposers: Vec<&str> = proposers.into_iter().collect();
     (!proposers.is_empty()).then(|| {
         format!(
-            "{name}: {} of {} boxes, in {} frames, were proposed by {} and not reviewed: figures of it, and \
-             of pipelines like it, are too good there",
+            "{name}: {} of {} boxes, in {} frames, were proposed by {} and not reviewed: its \
+             figures there, and those of similar pipelines, are too good",
             proposed.count(),
             rows.len(),
             frames.len(),
@@ -426,7 +427,7 @@ fn is_of_run(path: &Path) -> bool {
     name.starts_with("tracks") && path.parent().is_some_and(is_run)
 }
 
-/// Returns the failure of a log without truth, with the file of truth beside it.
+/// Returns the failure for a log without truth, with the file of truth beside it.
 fn without_truth(log: &Path) -> Failure {
     let shown = log.display();
     if let Some((beside, _)) = file_beside(log) {
@@ -460,7 +461,7 @@ fn kind_of(path: &Path) -> Result<Kind, Failure> {
     }
 
     match path.extension().and_then(|extension| extension.to_str()) {
-        // A log is binary, so its ending decides; the text formats have no reliable ending.
+        // A log is binary, so its extension decides; the text formats have no reliable extension.
         Some("mcap") => return Ok(Kind::Log),
         Some("jsonl") => return Ok(Kind::Lines),
         _ => {}
@@ -483,21 +484,22 @@ fn shown(path: &Path) -> String {
     path.display().to_string()
 }
 
-/// Returns the problem and the remedy of annotations that an importer reads, by their first line; `None`
-/// for any other file.
+/// Returns the problem and the remedy for annotations that an importer reads, recognised by their
+/// first line; `None` for any other file.
 fn foreign(first: &str) -> Option<&'static str> {
     match first.trim_start().chars().next()? {
         '{' | '[' => Some(
-            "FILE is JSON, and no truth of a log: of COCO `tagalong import images FOLDER --boxes FILE` \
-             makes a log with truth",
+            "FILE is JSON, not a truth of a log: of COCO `tagalong import images FOLDER --boxes \
+             FILE` makes a log with truth",
         ),
         '<' => Some(
-            "FILE is XML, and no truth of a log: of CVAT `tagalong import cvat FILE -o LOG.people.csv` makes \
-             one",
+            "FILE is XML, not a truth of a log: of CVAT `tagalong import cvat FILE -o \
+             LOG.people.csv` makes one",
         ),
         letter if letter.is_alphabetic() && first.contains([',', ';', '\t']) => Some(
-            "FILE has columns of another format, and is no truth of a log: with image and box `tagalong \
-             import images FOLDER --boxes FILE` makes a log with truth; see docs/logs.md for people.csv",
+            "FILE has columns of another format, and is not a truth of a log: with image and box \
+             `tagalong import images FOLDER --boxes FILE` makes a log with truth; see docs/logs.md \
+             for people.csv",
         ),
         _ => None,
     }
@@ -604,7 +606,10 @@ mod tests {
         let frames = file.frames(&Shots::default());
         assert_eq!(frames[&1].0, [person_at(5, 1.0), person_at(6, 3.0)]);
         assert_eq!(frames[&2].0.len(), 1);
-        assert_eq!(file.notes, ["gt.txt: 1 people are left out, whose ID the frame has already"]);
+        assert_eq!(
+            file.notes,
+            ["gt.txt: 1 people are left out, because the frame has their ID already"]
+        );
     }
 
     /// A person with a small box at this column.

@@ -1,7 +1,7 @@
 //! `tagalong boxes`: association alone, on the boxes of another detector.
 //!
-//! Every tracker gets the very same boxes, in memory and without images, so that a setting of
-//! association is tried on thousands of frames in less than a second.
+//! Every tracker gets exactly the same boxes, in memory and without images, so that a setting of
+//! the association is tried on thousands of frames in less than a second.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -24,9 +24,9 @@ use tagalong_trials::{
     Contender, GivenSequence, GivenTracks, TrialError, for_given_boxes, in_order,
 };
 
-/// The config that is run where none is named.
+/// The config that is used if none is named.
 const RECORDED: &str = "configs/recorded.toml";
-/// Columns of the tables: means over sequences, and all boxes together.
+/// Columns of the tables: means over sequences, and figures over all boxes together.
 const COLUMNS: [&str; 8] = [
     "HOTA, mean",
     "IDF1, mean",
@@ -73,16 +73,16 @@ pub struct BoxesArgs {
     /// The objective: the mean of this figure over the places is maximised.
     #[arg(long, value_enum, default_value_t = Objective::HotaAndIdf1)]
     pub objective: Objective,
-    /// Most settings that are tried for a pipeline: all combinations if there are no more, otherwise a
-    /// sample. Those of the config are scored, too, but chosen only if they are among them; with 1 only
-    /// those of the config are scored.
+    /// Maximum number of settings that are tried for a pipeline: all combinations if there are no
+    /// more, otherwise a sample. Those of the config are also scored, but chosen only if they are
+    /// among them; with 1 only those of the config are scored.
     #[arg(long, value_name = "N", default_value_t = 100,
           value_parser = clap::value_parser!(u16).range(1..=10_000))]
     pub budget: u16,
     /// Seed of the sample.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// Runs at once; the results are the same [default: as many as there are cores].
+    /// Number of runs in parallel; it does not affect the results [default: the number of cores].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     pub jobs: Option<u8>,
     /// Writes the tracks to CONFIG/SEQUENCE.txt in this folder; those with the settings
@@ -98,13 +98,13 @@ pub struct BoxesArgs {
 struct Contestant {
     name: String,
     tunables: Vec<Tunable>,
-    /// Values and their contenders: first those among which the sequences choose.
+    /// Values and their contenders, beginning with those among which the sequences choose.
     settings: Vec<(Vec<toml::Value>, Contender)>,
     /// Number of settings among which the sequences choose.
     candidates: usize,
-    /// Way to find them.
+    /// How they were searched.
     search: Search,
-    /// Place of the settings of the config, which are a candidate only by chance.
+    /// Index of the settings of the config, which are a candidate only by chance.
     shipped: usize,
 }
 
@@ -118,7 +118,7 @@ struct Tracked {
 /// Tracks the boxes and prints the tables.
 ///
 /// # Errors
-/// Configs that cannot be used are exit code 2; files that cannot be read are 1.
+/// Configs that cannot be used give exit code 2; files that cannot be read give 1.
 pub fn boxes(args: &BoxesArgs, registry: &Registry) -> Outcome {
     let (folder, configs) = folder_and_configs(args)?;
     let contestants = contestants(configs, args, registry)?;
@@ -156,7 +156,7 @@ pub fn boxes(args: &BoxesArgs, registry: &Registry) -> Outcome {
     Ok(Ended::Well)
 }
 
-/// Sequences, and the place of each by its number.
+/// Sequences, and the index of the place of each.
 struct Bench<'a> {
     args: &'a BoxesArgs,
     registry: &'a Registry,
@@ -182,7 +182,8 @@ impl Bench<'_> {
         .map_err(|error| failed(&error))
     }
 
-    /// Runs all settings on all sequences; returns which are chosen, and the number of those tried.
+    /// Runs all settings on all sequences; returns the chosen ones, and the number of those that
+    /// were tried.
     fn choose(&self, contestant: &Contestant) -> Result<(Choice, usize), Failure> {
         let places = self.places.iter().max().map_or(0, |last| last + 1);
         if places < 2 {
@@ -222,7 +223,7 @@ impl Bench<'_> {
         words
     }
 
-    /// Writes the tracks of a pipeline, where that is asked for, and keeps them with its name.
+    /// Writes the tracks of a pipeline, if requested, and keeps them with its name.
     fn keep_tracks(
         &self,
         name: String,
@@ -272,7 +273,8 @@ impl Contestant {
         let mut settings: Vec<(Vec<toml::Value>, Contender)> = Vec::new();
         for values in candidates(&tunables, args.budget.into(), args.seed) {
             let contender = contender(file, &resolved, &tunables, &values)?;
-            // Each value is allowed, so that a refusal is of a combination that contradicts itself.
+            // Each value alone is allowed, so a rejection means that the combination contradicts
+            // itself.
             if values == now || contender.pipeline(registry, 1).is_ok() {
                 settings.push((values, contender));
             }
@@ -304,7 +306,7 @@ impl Contestant {
     }
 }
 
-/// Returns the failure of trackers or of their scores, with the option that cures it.
+/// Returns the failure of trackers or of their scoring, with the option that solves it.
 fn failed(error: &TrialError) -> Failure {
     Failure::failed(match error {
         TrialError::Eval(error) => with_remedy(error),
@@ -312,11 +314,11 @@ fn failed(error: &TrialError) -> Failure {
     })
 }
 
-/// Returns the folder of the sequences, and the configs. A folder behind `--configs`, which takes all
-/// paths that follow it, is the one of the sequences.
+/// Returns the folder of the sequences, and the configs. Since `--configs` takes all paths that
+/// follow it, a folder among them is that of the sequences.
 ///
 /// # Errors
-/// No folder of sequences: the order to type.
+/// A missing folder of sequences, with the command to type.
 fn folder_and_configs(args: &BoxesArgs) -> Result<(&Path, &[PathBuf]), Failure> {
     if let Some(folder) = &args.sequences {
         return Ok((folder, &args.configs));
@@ -330,14 +332,15 @@ fn folder_and_configs(args: &BoxesArgs) -> Result<(&Path, &[PathBuf]), Failure> 
     }
 }
 
-/// Keeps the first of doubled IDs of each truth, and tells how many others there are.
+/// Keeps the first of several people with the same ID in each truth, and reports the number of the
+/// others.
 fn drop_doubled_ids(sequences: &mut [GivenSequence]) {
     for sequence in sequences {
         let dropped = sequence.drop_doubled_ids();
         if dropped > 0 {
             let name = &sequence.info.name;
             say(&format!(
-                "note: {name}: {dropped} people are left out, whose ID the frame has already"
+                "note: {name}: {dropped} people are left out, because the frame has their ID already"
             ));
         }
     }
@@ -366,8 +369,8 @@ fn contestants(
     named.iter().map(|path| Contestant::new(&ConfigFile::read(path)?, args, registry)).collect()
 }
 
-/// Returns the number of the place of each sequence: names that agree up to the first hyphen are of
-/// one place, unless all of them do.
+/// Returns the index of the place of each sequence: names that agree up to the first hyphen belong
+/// to one place, unless all of them do.
 fn places(sequences: &[GivenSequence]) -> Vec<usize> {
     let names: Vec<&str> = sequences.iter().map(|sequence| sequence.info.name.as_str()).collect();
     numbered(&names)

@@ -10,7 +10,8 @@ pub fn contender(file: &ConfigFile) -> Contender {
     Contender { folder, ..Contender::new(file.stem(), file.whole_text()) }
 }
 
-/// Returns the note on a config and the scenes, by name, that it does not suit; `None` if it suits all.
+/// Returns a note on a config and the scenes, by name, for which it is not suitable; `None` if it
+/// suits all.
 pub fn unsuited<'a>(
     config: &str,
     suits: &Suits,
@@ -19,7 +20,7 @@ pub fn unsuited<'a>(
     let mut unsuited: Vec<(String, Vec<String>)> = Vec::new();
     for (name, scene) in scenes {
         let misfits = traits(scene).misfits(suits);
-        // Of the variants of a scene the first that does not fit stands for all.
+        // Among the variants of a scene, the first that does not fit represents all.
         match unsuited.iter_mut().find(|(other, _)| other == name) {
             Some((_, known)) if known.is_empty() => *known = misfits,
             Some(_) => {}
@@ -29,7 +30,7 @@ pub fn unsuited<'a>(
     misfit_note(config, &unsuited)
 }
 
-/// Returns the properties of a scene that `[suits]` may speak of.
+/// Returns the properties of a scene that `[suits]` can refer to.
 fn traits(scene: &Scene) -> Traits {
     let camera = &scene.camera;
     let is_pair = camera.kind == CameraKind::Stereo;

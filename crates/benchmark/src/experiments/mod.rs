@@ -1,5 +1,5 @@
-//! Experiments: pipelines compared on many random variants of simulated scenes, or on given boxes;
-//! rides after a person.
+//! Experiments: pipelines compared on many random variants of simulated scenes, or on given boxes,
+//! and rides in which the robot follows a person.
 
 pub mod boxes;
 mod contender;

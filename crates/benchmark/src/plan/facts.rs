@@ -1,4 +1,4 @@
-//! Facts of a file of rooms for a benchmark without left-out rooms.
+//! Properties of logs from a file of rooms, for a benchmark in which no room is left out.
 
 use std::path::Path;
 
@@ -10,10 +10,10 @@ use tagalong_config::ConfigError;
 use super::{Annotated, with_truth};
 use crate::tuning::{Room, RoomFile, Rooms};
 
-/// Returns all logs of the rooms, with their truth and what the rooms say about them.
+/// Returns all logs of the rooms, with their truth and the properties that the file states.
 ///
 /// # Errors
-/// A file that cannot be read, or a log without truth; with its place in the file.
+/// A file that cannot be read, or a log without truth; with the position in the file.
 pub fn of_rooms(path: &Path) -> Result<Vec<Annotated>, Failure> {
     let (rooms, text) = read(path)?;
     let shown = path.display().to_string();
@@ -25,15 +25,16 @@ pub fn of_rooms(path: &Path) -> Result<Vec<Annotated>, Failure> {
     Ok(logs)
 }
 
-/// Returns the logs of a room, with their truth and what the room says about them.
+/// Returns the logs of a room, with their truth and the properties that the file states.
 ///
 /// # Errors
-/// A log that cannot be read or has no truth, with its place in the file.
+/// A log that cannot be read or has no truth, with its position in the file.
 pub fn of_room(room: &Room) -> Result<Vec<Annotated>, ConfigError> {
     room.logs.iter().map(|log| Ok(with_facts(of_file(log)?, room))).collect()
 }
 
-/// Adds what the rooms say about logs, by their names; says which are in no room.
+/// Adds the properties that the file of rooms states to logs, by name; reports the logs that are in
+/// no room.
 ///
 /// # Errors
 /// A file that cannot be read.
@@ -53,7 +54,7 @@ pub fn in_rooms(path: &Path, logs: Vec<Annotated>) -> Result<Vec<Annotated>, Fai
     Ok(known)
 }
 
-/// Returns a log with what its room says about it.
+/// Returns a log with the properties of its room.
 fn with_facts(log: Annotated, room: &Room) -> Annotated {
     let file = room.logs.iter().find(|file| file.name() == log.name);
     let unjudged = file.map_or_else(Vec::new, |file| room.unjudged(file).to_vec());

@@ -34,9 +34,9 @@ pub struct RoomsArgs {
     /// maximised.
     #[arg(long, value_enum, default_value_t = Objective::Hota)]
     pub objective: Objective,
-    /// Most settings that are tried for a pipeline: all combinations if there are no more, otherwise a
-    /// sample. Those of the config are scored, too, but chosen only if they are among them; with 1 only
-    /// those of the config are scored.
+    /// Maximum number of settings that are tried for a pipeline: all combinations if there are no
+    /// more, otherwise a sample. Those of the config are also scored, but chosen only if they are
+    /// among them; with 1 only those of the config are scored.
     #[arg(long, value_name = "N", default_value_t = 32,
           value_parser = clap::value_parser!(u16).range(1..=10_000))]
     pub budget: u16,
@@ -48,7 +48,7 @@ pub struct RoomsArgs {
     #[arg(long, value_name = "N", default_value_t = 3,
           value_parser = clap::value_parser!(u8).range(1..=100))]
     pub samples: u8,
-    /// Runs at once; the results are the same.
+    /// Number of runs in parallel; it does not affect the results.
     #[arg(long, value_name = "N", default_value_t = 1,
           value_parser = clap::value_parser!(u16).range(1..=256))]
     pub jobs: u16,

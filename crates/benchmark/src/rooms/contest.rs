@@ -15,25 +15,26 @@ pub struct Location {
     pub name: String,
     pub about: String,
     pub logs: Vec<Annotated>,
-    /// Models that have not seen it, by the plugin that reads them.
+    /// Models that were trained without this room, by the plugin that reads them.
     pub models: BTreeMap<String, PathBuf>,
-    /// True if nothing is tracked over its frames: it has no say in a choice.
+    /// True if its frames are not tracked over time; then it does not affect a choice.
     pub single_frames: bool,
 }
 
 /// Pipeline with all settings that are tried.
 pub struct Contestant {
-    /// Config as it is shipped.
+    /// Config as shipped.
     pub config: PlannedConfig,
-    /// Settings that run: first those among which the rooms choose.
+    /// Settings to run: first those among which the rooms choose.
     pub settings: Vec<Setting>,
-    /// Number of settings among which the rooms choose, in all samples together.
+    /// Number of settings among which the rooms choose, over all samples.
     pub candidates: usize,
-    /// For each seed its sample: places in `settings`. One, if a seed has no say.
+    /// For each seed its sample, as indices into `settings`; a single sample if it does not depend
+    /// on a seed.
     pub samples: Vec<Vec<usize>>,
-    /// Way to find them.
+    /// How they were searched.
     pub search: Search,
-    /// Place of the settings of the config, which are a candidate only by chance.
+    /// Index of the settings of the config, which are a candidate only by chance.
     pub shipped: usize,
     /// Number of combinations of the first sample that contradict themselves.
     pub refused: usize,
@@ -45,7 +46,7 @@ pub struct Setting {
     pub values: Vec<toml::Value>,
     /// Config with these values.
     as_is: Variant,
-    /// The same, with models that have not seen a room, by its name.
+    /// The same configs with models that were trained without a room, by its name.
     unseen: BTreeMap<String, Variant>,
 }
 
@@ -57,7 +58,7 @@ pub struct Variant {
 }
 
 impl Contestant {
-    /// Builds the pipeline once with each combination.
+    /// Creates the contestant, and builds the pipeline once with each combination.
     ///
     /// # Errors
     /// Values that a setting does not allow, with their line.
@@ -105,7 +106,8 @@ impl Contestant {
             );
             return Err(Failure::usage(why));
         }
-        // A later sample of nothing but contradictions says nothing of the spread.
+        // A later sample that consists only of contradictions gives no information about the
+        // spread.
         samples.retain(|sample| !sample.is_empty());
         let candidates = settings.len();
         let shipped = settings.iter().position(|setting| setting.values == now);
@@ -117,7 +119,7 @@ impl Contestant {
         Ok(Self { config, settings, candidates, samples, search, shipped, refused })
     }
 
-    /// Returns its name in tables.
+    /// Returns the name in tables.
     pub fn name(&self) -> String {
         self.config.file.stem()
     }
@@ -133,7 +135,7 @@ impl Contestant {
 }
 
 impl Setting {
-    /// Returns `None` if each value is allowed, but not all of them together.
+    /// Returns `None` if each value is allowed, but not this combination.
     fn new(
         config: &PlannedConfig,
         resolved: &ResolvedConfig,
@@ -159,12 +161,13 @@ impl Setting {
         Ok(Some(Self { values, as_is, unseen }))
     }
 
-    /// Tells whether some model of the config has seen a room.
+    /// Returns true if some model of the config was trained with a room.
     pub fn has_seen(&self, room: &str) -> bool {
         self.unseen.contains_key(room)
     }
 
-    /// Returns the config to run in a room, with models that have not seen it or as it is.
+    /// Returns the config to run in a room, with models that were trained without it, or as
+    /// shipped.
     pub fn variant(&self, room: &str, unseen: bool) -> &Variant {
         let variant = self.unseen.get(room).filter(|_| unseen);
         variant.unwrap_or(&self.as_is)
@@ -172,7 +175,7 @@ impl Setting {
 }
 
 impl Variant {
-    /// `resolved` is the config with every default.
+    /// Creates the variant; `resolved` is the config with every default.
     fn new(
         config: &PlannedConfig,
         file: ConfigFile,
@@ -184,7 +187,7 @@ impl Variant {
         Ok(Self { file, hash: sha256(everything.as_bytes()) })
     }
 
-    /// Returns the name of its result on a log: a hash of everything that it depends on.
+    /// Returns the name of its result on a log: a hash of everything on which it depends.
     pub fn run_hash(&self, log: &Annotated, version: &str) -> String {
         let Annotated { sha256: log, truth_sha256, whole_bodies, unjudged, .. } = log;
         let truth = format!("{truth_sha256}\n{whole_bodies}\n{unjudged:?}");
@@ -193,8 +196,8 @@ impl Variant {
     }
 }
 
-/// Returns the config with a room's models where it has the built-in ones; `None` if it has none
-/// of these. `resolved` has every setting.
+/// Returns the config with the models of a room in place of built-in ones; `None` if it uses no
+/// built-in model that the room replaces. `resolved` has every setting.
 fn with_models(
     resolved: &toml::Table,
     models: &BTreeMap<String, PathBuf>,

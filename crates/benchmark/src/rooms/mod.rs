@@ -1,4 +1,4 @@
-//! `tagalong bench --leave-one-room-out`: the settings that a config names in `[tune]` are fitted
+//! `tagalong bench --leave-one-room-out`: the settings that a config names in `[tune]` are chosen
 //! on all rooms but one, and scored in that one.
 
 mod args;
@@ -95,7 +95,7 @@ fn contestants(
     } else {
         named.iter().map(|path| plan::candidate(path, registry)).collect::<Result<_, _>>()?
     };
-    // A config that is named takes part even without `[tune]`, for comparison.
+    // A named config takes part even without `[tune]`, for comparison.
     if named.is_empty() {
         configs.retain(|config| !config.tune.is_empty());
     }

@@ -1,4 +1,4 @@
-//! Pipelines beside the last one that was named, in rooms that had no say in their settings.
+//! Comparison of pipelines with the last one that was named, in the left-out rooms.
 
 use crate::tuning::Figures;
 use serde::Serialize;
@@ -11,7 +11,7 @@ use super::report::Fitted;
 struct Compared {
     /// Title of its column.
     title: &'static str,
-    /// True if single frames have no say in it.
+    /// True if single frames do not count for it.
     is_over_time: bool,
     /// Digits of its value and of a difference of it.
     digits: [usize; 2],
@@ -35,13 +35,13 @@ const COMPARED: [Compared; 7] = [
     Compared { title: "recall", is_over_time: false, read: |figures| figures.recall, ..RATE },
 ];
 
-/// Differences of a pipeline to the baseline over the rooms that both can read.
+/// Differences between a pipeline and the baseline over the rooms that both can read.
 #[derive(Serialize)]
 pub struct Pair {
     pipeline: String,
     baseline: String,
     rooms: usize,
-    /// In the order of [`COMPARED`]; none if there is no such room.
+    /// In the order of [`COMPARED`]; `None` if there is no such room.
     gains: Vec<Option<Gain>>,
 }
 
@@ -102,7 +102,7 @@ pub fn differences(pairs: &[Pair]) -> Option<Table> {
     })
 }
 
-/// Returns the table of each log, in which the pipelines stand beside each other.
+/// Returns the table of each log, with the pipelines side by side.
 pub fn by_log(pipelines: &[Fitted]) -> Table {
     let rows = pipelines.iter().flat_map(|pipeline| {
         let logs = pipeline.rooms.iter().flat_map(|room| &room.logs);

@@ -17,7 +17,7 @@ use super::pairs::{Pair, by_log, differences, pairs};
 use super::work::{Desk, Run};
 use crate::plan::Annotated;
 
-/// Everything that the tables show.
+/// Data of the tables.
 #[derive(Serialize)]
 pub struct Report {
     objective: Objective,
@@ -25,7 +25,7 @@ pub struct Report {
     seed: u64,
     rooms: Vec<About>,
     pipelines: Vec<Fitted>,
-    /// The named pipelines beside the last of them.
+    /// The named pipelines compared with the last of them.
     pairs: Vec<Pair>,
 }
 
@@ -42,7 +42,7 @@ struct About {
 #[derive(Default, Serialize)]
 pub struct Fitted {
     pub name: String,
-    /// Way in which settings were searched.
+    /// How settings were searched.
     search: Search,
     /// Number of settings among which the rooms chose.
     settings: usize,
@@ -53,8 +53,8 @@ pub struct Fitted {
     shipped: Values,
     chosen_with_all: Values,
     pub rooms: Vec<InRoom>,
-    /// Means over the rooms with the settings that each sample chose without them, the first one in
-    /// the tables; one, if a seed has no say.
+    /// Means over the left-out rooms with the settings that each sample chose; the first sample is
+    /// the one in the tables. A single one if the choice does not depend on a seed.
     by_sample: Vec<Figures>,
     /// Reason for an empty result.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -64,7 +64,7 @@ pub struct Fitted {
 /// Values of settings, by key.
 type Values = BTreeMap<String, toml::Value>;
 
-/// Reads one of the figures.
+/// Function that reads one of the figures.
 type Read = fn(&Figures) -> f64;
 
 #[derive(Serialize)]
@@ -77,18 +77,18 @@ struct Skipped {
 #[derive(Serialize)]
 pub struct InRoom {
     pub room: String,
-    /// True if nothing is tracked over its frames: it has no say in the choice, nor in the means of
-    /// the figures of tracking.
+    /// True if its frames are not tracked over time: it affects neither the choice nor the means of
+    /// the tracking figures.
     pub single_frames: bool,
     /// Settings that the other rooms chose.
     chosen_without: Values,
-    /// Their score here.
+    /// Their score in this room.
     pub without: Figures,
-    /// Score of the choice of all rooms here.
+    /// Score in this room of the settings that all rooms chose.
     with_all: Figures,
-    /// Score of the config's settings here.
+    /// Score in this room of the config's settings.
     shipped: Figures,
-    /// The same log by log.
+    /// The same scores, log by log.
     pub logs: Vec<InLog>,
 }
 
@@ -96,9 +96,9 @@ pub struct InRoom {
 #[derive(Serialize)]
 pub struct InLog {
     pub log: String,
-    /// With the settings that the other rooms chose.
+    /// Figures with the settings that the other rooms chose.
     pub without: Figures,
-    /// With those of the config.
+    /// Figures with the settings of the config.
     pub shipped: Figures,
 }
 
@@ -160,7 +160,7 @@ impl Report {
         std::iter::once(self.summary()).chain(beside).chain(each).collect()
     }
 
-    /// Says among which settings the rooms chose.
+    /// States among which settings the rooms chose.
     fn searched(&self) -> String {
         let mut by_grid: Vec<&str> = Vec::new();
         let mut by_sample: Vec<&str> = Vec::new();
@@ -237,7 +237,7 @@ impl Report {
     }
 }
 
-/// Returns the name of a log, and the frames in which people are not judged.
+/// Returns the name of a log, and the frames in which people are not scored.
 fn described(log: &Annotated) -> String {
     let frames: Vec<String> = log.unjudged.iter().map(ToString::to_string).collect();
     match &frames[..] {
@@ -286,7 +286,7 @@ impl Scorer<'_> {
                 rooms.push((location, readable));
             }
         }
-        // With one room there is no other one to choose the settings by.
+        // With a single room there is no other one that could choose the settings.
         let choosing = rooms.iter().filter(|(location, _)| !location.single_frames).count();
         let too_few = (choosing < 2).then(|| {
             let beside = if choosing < rooms.len() { " beside those of single frames" } else { "" };
@@ -297,7 +297,7 @@ impl Scorer<'_> {
         }
         let unseen = self.table(true, &rooms)?;
         let seen = self.table(false, &rooms)?;
-        // A model that has seen a room would make any setting look good there.
+        // A model that was trained with a room would make any setting look good there.
         let has_say = rooms.iter().map(|(location, _)| !location.single_frames).collect();
         let poll = Poll { weights: Weights::People, has_say };
         let singles: Vec<bool> = rooms.iter().map(|(location, _)| location.single_frames).collect();
@@ -400,20 +400,21 @@ fn chosen_in(
     }
 }
 
-/// Returns the least and the largest value of a figure.
+/// Returns the minimum and the maximum of a figure.
 fn ends(figures: &[Figures], read: Read) -> [f64; 2] {
     let values = figures.iter().map(read);
     [values.clone().fold(f64::INFINITY, f64::min), values.fold(f64::NEG_INFINITY, f64::max)]
 }
 
-/// Returns the mean of figures over rooms; those of tracking are of rooms that are not single frames.
+/// Returns the mean of figures over rooms; those of tracking are taken over rooms that are not
+/// single frames.
 fn over_rooms(rooms: &[InRoom], read: fn(&InRoom) -> &Figures, weights: Weights) -> Figures {
     let all: Vec<(bool, &Figures)> =
         rooms.iter().map(|room| (room.single_frames, read(room))).collect();
     mean_over_rooms(&all, weights)
 }
 
-/// Returns the mean of the figures of rooms, each with whether it has single frames.
+/// Returns the mean of the figures of rooms, each with true if it has single frames.
 fn mean_over_rooms(rooms: &[(bool, &Figures)], weights: Weights) -> Figures {
     let tracked = rooms.iter().filter(|(single_frames, _)| !single_frames);
     let tracked = weighted_mean(tracked.map(|(_, figures)| *figures), weights);
@@ -436,12 +437,12 @@ impl Fitted {
         }
     }
 
-    /// Returns the two means: the one that weighs rooms by their people first.
+    /// Returns the two means, first the one that weights rooms by their people.
     fn means(&self) -> [InRoom; 2] {
         [self.mean("mean", Weights::People), self.mean("mean, rooms alike", Weights::Equal)]
     }
 
-    /// Returns the cells of the mean, and HOTA of the one of rooms alike.
+    /// Returns the cells of the mean, and the HOTA of the mean with equal weights.
     fn mean_cells(&self) -> Vec<Cell> {
         let [mean, alike] = self.means();
         [cells(&mean), vec![Cell::number(alike.without.hota, 3)]].concat()
@@ -469,7 +470,7 @@ impl Fitted {
             }
         }];
         notes.extend(self.spread(seed));
-        notes.extend(self.too_few.as_ref().map(|why| format!("Nothing to say: it {why}.")));
+        notes.extend(self.too_few.as_ref().map(|why| format!("No figures: it {why}.")));
         let mut chosen: BTreeMap<String, Vec<&str>> = BTreeMap::new();
         for InRoom { room, chosen_without, .. } in &self.rooms {
             chosen.entry(self.changes(chosen_without)).or_default().push(room);
@@ -485,7 +486,7 @@ impl Fitted {
         notes
     }
 
-    /// Says how far the samples of several seeds lie apart, if there are several.
+    /// States how far apart the samples of several seeds are, if there are several.
     fn spread(&self, seed: u64) -> Option<String> {
         if self.by_sample.len() < 2 || self.rooms.is_empty() {
             return None;

@@ -1,5 +1,5 @@
-//! Runs all settings of all pipelines over all logs. Runs that see the same frames go over a log
-//! side by side and share their findings.
+//! Runs all settings of all pipelines on all logs. Runs that see the same frames process a log side
+//! by side and share their detections.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::ControlFlow;
@@ -21,16 +21,16 @@ use crate::plan::{self, Annotated, version};
 use crate::store::Store;
 use crate::work::{Lane, bar, spread, work_through};
 
-/// Most pipelines side by side; a signal loses at most one pass of these per job.
+/// Maximum number of pipelines side by side; a signal loses at most one pass of these per job.
 const LANES: usize = 48;
 
-/// Setting of a contestant on a log, by their places in the lists.
+/// A setting of a contestant on a log, by their indices in the lists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Run {
     pub contestant: usize,
     pub setting: usize,
     pub log: usize,
-    /// With models that have not seen the room.
+    /// True with models that were trained without the room.
     pub unseen: bool,
 }
 
@@ -43,7 +43,7 @@ pub struct RoomResult {
     pub data_lost: bool,
 }
 
-/// File of a result.
+/// Contents of a result file.
 #[derive(Serialize, Deserialize)]
 struct StoredRoom {
     /// Hash of the run, as in the name of the file.
@@ -72,7 +72,7 @@ pub struct Desk<'a> {
     /// Logs with their rooms.
     logs: Vec<(&'a str, &'a Annotated)>,
     version: String,
-    /// Reasons for which a contestant cannot run on a log.
+    /// Reasons why a contestant cannot run on a log.
     skips: BTreeMap<(usize, usize), String>,
 }
 
@@ -107,7 +107,7 @@ impl<'a> Desk<'a> {
         Ok(Self { store, registry, contestants, logs, version: version()?, skips })
     }
 
-    /// Returns the reason for which a contestant cannot run on a log, if there is one.
+    /// Returns the reason why a contestant cannot run on a log, if there is one.
     pub fn skip(&self, contestant: usize, log: usize) -> Option<&str> {
         self.skips.get(&(contestant, log)).map(String::as_str)
     }
@@ -118,7 +118,7 @@ impl<'a> Desk<'a> {
         setting.variant(self.logs[run.log].0, run.unseen)
     }
 
-    /// Returns the result of a run, if it exists and says itself that it is of this run.
+    /// Returns the result of a run, if it exists and contains the hash of this run.
     pub fn result(&self, run: Run) -> Option<RoomResult> {
         let hash = self.hash(run);
         let stored: StoredRoom = self.store.get(&room_name(&hash))?;
@@ -132,7 +132,7 @@ impl<'a> Desk<'a> {
     /// Does the runs that have no result yet.
     ///
     /// # Errors
-    /// Runs that fail, after all others are done; a disk that fails, at once.
+    /// Runs that fail, after all others are done; a failure of the disk, at once.
     pub fn work(&self, jobs: usize) -> Result<RunSummary, Failure> {
         let signals = Signals::listen()?;
         let asked = self.runs();
@@ -168,7 +168,7 @@ impl<'a> Desk<'a> {
                 }
                 for (setting, values) in about.settings.iter().enumerate() {
                     runs.push(Run { contestant, setting, log, unseen: false });
-                    // Without a say in a choice, a setting is scored as it is shipped alone.
+                    // If a setting cannot be chosen, it is scored only as shipped.
                     if setting < about.candidates && values.has_seen(room) {
                         runs.push(Run { contestant, setting, log, unseen: true });
                     }
@@ -190,12 +190,12 @@ impl<'a> Desk<'a> {
     }
 }
 
-/// Jobs at work.
+/// Running jobs.
 struct Shift<'a> {
     desk: &'a Desk<'a>,
     signals: &'a Signals,
     bar: &'a ProgressBar,
-    /// Set when it is useless to go on.
+    /// Set when it is useless to continue.
     stop: AtomicBool,
     /// Errors by run, so that the same one is reported first for any number of jobs.
     failed: Mutex<BTreeMap<Run, String>>,
@@ -222,7 +222,7 @@ impl Shift<'_> {
         self.failed.lock().unwrap_or_else(PoisonError::into_inner).entry(run).or_insert(why);
     }
 
-    /// Goes over a log once, with all pipelines of the pass. A failed pipeline does not affect the
+    /// Processes a log once, with all pipelines of the pass. A failed pipeline does not affect the
     /// others.
     fn pass(&self, pass: &[Run]) -> Result<(), Failure> {
         let Some(first) = pass.first() else { return Ok(()) };
@@ -236,7 +236,7 @@ impl Shift<'_> {
             pass.iter().map(|run| Lane::new(|| self.pipeline(*run))).collect();
         let mut shots = Shots::default();
         while let Some(item) = source.next_frame() {
-            // Partial results are discarded: a stored result is always one of a whole log.
+            // Partial results are discarded, so that a stored result always covers a whole log.
             if self.has_to_stop() {
                 return Ok(());
             }
@@ -259,12 +259,13 @@ impl Shift<'_> {
     fn pipeline(&self, run: Run) -> Result<tagalong_pipeline::Pipeline, Failure> {
         let file = &self.desk.variant(run).file;
         let (mut pipeline, _) = file.pipeline(self.desk.registry, None)?;
-        // The settings of a pass differ mostly behind the detectors, so detections can be shared.
+        // The settings of a pass mostly differ in stages after the detectors, so detections can be
+        // shared.
         pipeline.share_findings();
         Ok(pipeline)
     }
 
-    /// Stores a result. A disk that fails stops all jobs, as it would fail for every run.
+    /// Stores a result. A failure of the disk stops all jobs, because it would affect every run.
     fn keep(&self, run: Run, result: RoomResult) -> Result<(), Failure> {
         let stored = StoredRoom { hash: self.desk.hash(run), result };
         let json = serde_json::to_vec(&stored).map_err(Failure::failed)?;
@@ -291,7 +292,7 @@ fn room_name(hash: &str) -> String {
     format!("rooms/{hash}.json")
 }
 
-/// Returns the figures of boxes where the truth has them, otherwise of positions.
+/// Returns the figures of boxes if the truth has them, otherwise those of positions.
 fn figures(
     lane: Lane,
     log: &Annotated,
@@ -302,5 +303,5 @@ fn figures(
     let blank = TaskResult { log: log.name.clone(), ..TaskResult::default() };
     let (result, _) = lane.watch.score(truth, shots, blank, None)?;
     let scores = result.image.or(result.metres).ok_or("its truth cannot be compared")?;
-    Figures::of(&scores).ok_or_else(|| "its truth has nobody to find".to_owned())
+    Figures::of(&scores).ok_or_else(|| "its truth has no people".to_owned())
 }

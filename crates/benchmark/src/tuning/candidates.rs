@@ -7,7 +7,7 @@ use tagalong_pipeline::Tunable;
 /// One value for each tunable setting, in their order.
 pub type Candidate = Vec<toml::Value>;
 
-/// Largest number of new deals for a candidate that is not there yet.
+/// Maximum number of new attempts to find a candidate that is not in the list yet.
 const ROUNDS: usize = 64;
 
 /// Returns the settings of the config.
@@ -15,14 +15,14 @@ pub fn shipped(tunables: &[Tunable]) -> Candidate {
     tunables.iter().map(|tunable| tunable.now.clone()).collect()
 }
 
-/// Ways to search settings.
+/// Ways to search for settings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case", tag = "tried")]
 pub enum Search {
-    /// Those of the config alone.
+    /// Only those of the config.
     #[default]
     Shipped,
-    /// All combinations: no seed has a say.
+    /// All combinations, which do not depend on a seed.
     Grid,
     /// A sample of the combinations, which depends on a seed.
     Sample {
@@ -43,7 +43,7 @@ impl Search {
         }
     }
 
-    /// Returns the number of different samples, of so many seeds.
+    /// Returns the number of different samples for this number of seeds.
     pub fn samples(self, wanted: u8) -> u8 {
         match self {
             Self::Shipped | Self::Grid => 1,
@@ -51,7 +51,7 @@ impl Search {
         }
     }
 
-    /// Says which settings were tried, `tried` in all.
+    /// Describes which settings were tried, `tried` in all.
     pub fn words(self, tried: usize, seed: u64) -> String {
         match self {
             Self::Shipped => "the settings of the config alone".to_owned(),
@@ -65,12 +65,12 @@ impl Search {
     }
 }
 
-/// Returns the settings to be tried, at most `budget`. All combinations where they are few enough;
-/// otherwise a sample of them in which each value of a setting comes equally often (in the manner of
-/// a Latin hypercube: McKay, Beckman and Conover, Technometrics 1979), the same for the same seed.
+/// Returns the settings to be tried, at most `budget`: all combinations if they are few enough;
+/// otherwise a sample of them in which each value of a setting is equally frequent (like a Latin
+/// hypercube: McKay, Beckman and Conover, Technometrics 1979). The same seed gives the same sample.
 ///
-/// The settings of the config are among them only if they come so: figures of all rooms may have
-/// chosen them. With a budget of 1 there is no choice, and they are all there is.
+/// The settings of the config are among them only by chance, because figures of all rooms may have
+/// been used to choose them. With a budget of 1 there is no choice, and only they are returned.
 pub fn candidates(tunables: &[Tunable], budget: usize, seed: u64) -> Vec<Candidate> {
     if budget <= 1 {
         return vec![shipped(tunables)];
@@ -81,7 +81,7 @@ pub fn candidates(tunables: &[Tunable], budget: usize, seed: u64) -> Vec<Candida
     }
 }
 
-/// All combinations, unless they are more than `most`.
+/// Returns all combinations, unless they are more than `most`.
 fn grid(tunables: &[Tunable], most: usize) -> Option<Vec<Candidate>> {
     let mut all: Vec<Candidate> = vec![Vec::new()];
     for Tunable { values, .. } in tunables {
@@ -99,7 +99,8 @@ fn grid(tunables: &[Tunable], most: usize) -> Option<Vec<Candidate>> {
     Some(all)
 }
 
-/// Returns settings dealt in blocks, so that a larger budget adds to those of a smaller one.
+/// Returns settings that are drawn in blocks, so that a larger budget adds to those of a smaller
+/// one.
 fn sample(tunables: &[Tunable], count: usize, seed: u64) -> Vec<Candidate> {
     let mut random = ChaCha::new(seed, 0);
     let mut seen = BTreeSet::new();
@@ -118,7 +119,7 @@ fn sample(tunables: &[Tunable], count: usize, seed: u64) -> Vec<Candidate> {
     chosen
 }
 
-/// So many values in random order, each as often as the others, or once more.
+/// Returns this number of values in random order, each as often as the others, or once more.
 fn dealt(values: &[toml::Value], count: usize, random: &mut ChaCha) -> Candidate {
     let order = shuffled(values.to_vec(), random);
     shuffled(order.into_iter().cycle().take(count).collect(), random)
@@ -134,7 +135,7 @@ fn shown(candidate: &Candidate) -> String {
     format!("{candidate:?}")
 }
 
-/// Formats a value without the digits that come from dividing a range.
+/// Formats a value without the excess digits that come from dividing a range.
 pub fn shown_value(value: &toml::Value) -> String {
     match value {
         toml::Value::Float(number) => format!("{:?}", (number * 1e9).round() / 1e9),

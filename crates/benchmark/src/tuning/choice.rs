@@ -14,42 +14,42 @@ pub struct Figures {
     /// IDF1.
     #[serde(rename = "IDF1")]
     pub idf1: f64,
-    /// Number of IDs that another person had last; of a mean, the sum.
+    /// Number of IDs that another person had last; for a mean, the sum.
     #[serde(rename = "inherited_ids")]
     pub inherited: u64,
     /// MOTA.
     #[serde(rename = "MOTA")]
     pub mota: f64,
-    /// False people in a frame.
+    /// False positives per frame.
     #[serde(rename = "FP_per_frame")]
     pub false_a_frame: f64,
     /// Fraction of the people that were found.
     pub recall: f64,
-    /// The same of people within 5 m of whom at least 90 % shows, where that is annotated.
+    /// The same for people within 5 m with at least 90 % visible, if that is annotated.
     pub recall_free: Option<f64>,
-    /// The same of those of whom 60 to 90 % shows.
+    /// The same for those with 60 to 90 % visible.
     pub recall_partly_hidden: Option<f64>,
-    /// Mean distance of a track from its person, m, where places are annotated.
+    /// Mean distance between a track and its person, m, if positions are annotated.
     pub position_error_m: Option<f64>,
-    /// Number of annotated people, each counted once per frame; of a mean, the sum.
+    /// Number of annotated people, each counted once per frame; for a mean, the sum.
     pub people: u64,
 }
 
 /// Weights of rooms in a mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Weights {
-    /// All rooms alike.
+    /// All rooms have the same weight.
     Equal,
     /// By the number of annotated people, each counted once per frame.
     People,
 }
 
-/// Rules of a choice: which rooms have a say in it, and how much.
+/// Rules of a choice: which rooms take part in it, and with which weight.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Poll {
     /// Weights of the rooms.
     pub weights: Weights,
-    /// For each room whether it has a say.
+    /// For each room, true if it takes part.
     pub has_say: Vec<bool>,
 }
 
@@ -74,17 +74,17 @@ pub enum Objective {
     Mota,
 }
 
-/// Which candidates are best, by their place in the list.
+/// The best candidates, by their indices in the list.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Choice {
-    /// For each room the one that is best in the other rooms.
+    /// For each room, the candidate that is best in the other rooms.
     pub without: Vec<usize>,
-    /// The one that is best in all rooms.
+    /// The candidate that is best in all rooms.
     pub with_all: usize,
 }
 
 impl Figures {
-    /// Takes the figures of a log; `None` if it has no people.
+    /// Reads the figures of a log; `None` if it has no people.
     pub fn of(scores: &Scores) -> Option<Self> {
         Some(Self {
             hota: scores.hota?,
@@ -112,7 +112,7 @@ impl Weights {
 }
 
 impl Poll {
-    /// Returns the rules by which all of so many rooms have the same say.
+    /// Returns rules with which this number of rooms take part with the same weight.
     pub fn of_equals(rooms: usize) -> Self {
         Self { weights: Weights::Equal, has_say: vec![true; rooms] }
     }
@@ -129,13 +129,13 @@ impl Objective {
     }
 }
 
-/// Returns the mean of figures, each of the same weight; zeros of none. Where some lack a figure,
-/// its mean is that of the others.
+/// Returns the mean of figures with equal weights; zeros without figures. A figure that some of
+/// them lack is averaged over the others.
 pub fn mean<'a>(figures: impl IntoIterator<Item = &'a Figures>) -> Figures {
     weighted_mean(figures, Weights::Equal)
 }
 
-/// Returns the mean of figures as [`mean`], with weights.
+/// Returns the weighted mean of figures, otherwise as [`mean`].
 pub fn weighted_mean<'a>(
     figures: impl IntoIterator<Item = &'a Figures>,
     weights: Weights,
@@ -169,8 +169,8 @@ fn mean_of(all: &[&Figures], weights: Weights, figure: fn(&Figures) -> Option<f6
     (weight > 0.0).then(|| sum / weight)
 }
 
-/// Returns the choice without each room, and the one with all. `figures` has those of each
-/// candidate in each room, of which at least two have a say. Of equally good candidates the first is
+/// Returns the choice without each room, and the one with all. `figures` has the figures of each
+/// candidate in each room; at least two rooms take part. Of equally good candidates the first is
 /// taken.
 pub fn leave_one_out(figures: &[Vec<Figures>], objective: Objective, poll: &Poll) -> Choice {
     let rooms = figures.first().map_or(0, Vec::len);

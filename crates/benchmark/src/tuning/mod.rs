@@ -1,9 +1,9 @@
-//! Leave one room out: settings are chosen by all rooms but one, and scored in that one.
+//! Leave one room out: settings are chosen on all rooms but one, and scored in that one.
 //!
-//! All rooms choose among the same [`candidates`], which no figure has a say in: the settings of the
-//! config, which all rooms may have chosen, are one of them only by chance. So each candidate runs
-//! once on each log, whatever room is left out, and [`leave_one_out`] is arithmetic: the truth of a
-//! room cannot reach the choice made without it.
+//! All rooms choose among the same [`candidates`], which do not depend on any figure: the settings
+//! of the config, which all rooms may have chosen, are among them only by chance. So each candidate
+//! runs once on each log, whatever room is left out, and [`leave_one_out`] only computes: the truth
+//! of a room cannot affect the choice made without it.
 
 mod candidates;
 mod choice;

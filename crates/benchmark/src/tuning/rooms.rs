@@ -6,7 +6,7 @@ use serde::Deserialize;
 use tagalong_config::ConfigError;
 use toml::Spanned;
 
-/// Fewest rooms: one is left out, and one has to remain.
+/// Minimum number of rooms: one is left out, and one has to remain.
 const FEWEST: usize = 2;
 
 /// Logs by the room in which they were taken.
@@ -25,27 +25,27 @@ pub struct Room {
     pub about: String,
     /// Its logs.
     pub logs: Vec<RoomFile>,
-    /// Models that have not seen this room, by the plugin that reads them.
+    /// Models that were trained without this room, by the plugin that reads them.
     pub models: BTreeMap<String, RoomFile>,
-    /// True if its logs are single frames, over which nothing is tracked.
+    /// True if its logs are single frames, which are not tracked over time.
     pub single_frames: bool,
-    /// Frames of its logs whose annotation does not say where the upper body of a person is.
+    /// Frames of its logs in which the positions of upper bodies are not annotated.
     unjudged: BTreeMap<String, Vec<u32>>,
 }
 
 impl Room {
-    /// Returns the frames of a log in which people are not judged.
+    /// Returns the frames of a log in which people are not scored.
     pub fn unjudged(&self, log: &RoomFile) -> &[u32] {
         self.unjudged.get(&log.name()).map_or(&[], Vec::as_slice)
     }
 }
 
-/// A file, and where the text names it.
+/// A file, and the position where the text names it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RoomFile {
     /// The file.
     pub path: PathBuf,
-    /// Its place in the text.
+    /// Position in the text.
     pub place: Range<usize>,
 }
 
@@ -73,10 +73,11 @@ struct Entry {
 }
 
 impl Rooms {
-    /// Reads rooms of which one is to be left out, so that two are needed; as [`Self::read`].
+    /// Reads rooms of which one is to be left out, so that at least two are needed; otherwise as
+    /// [`Self::read`].
     ///
     /// # Errors
-    /// The fault in the text, with its place.
+    /// The error in the text, with its position.
     pub fn parse(
         text: &str,
         base_dir: &Path,
@@ -91,18 +92,18 @@ impl Rooms {
         Ok(read)
     }
 
-    /// Reads rooms. Paths of logs start at `folder` of the text, which starts at `base_dir`; or at
-    /// `logs_dir`, if there is one. Paths of models start at `base_dir`.
+    /// Reads rooms. Paths of logs are relative to `folder` in the text, which is relative to
+    /// `base_dir`; or to `logs_dir`, if that is given. Paths of models are relative to `base_dir`.
     ///
     /// # Errors
-    /// The fault in the text, with its place.
+    /// The error in the text, with its position.
     pub fn read(text: &str, base_dir: &Path, logs_dir: Option<&Path>) -> Result<Self, ConfigError> {
         let (read, _) = Self::placed(text, base_dir, logs_dir)?;
         refuse_twins(&read.rooms)?;
         Ok(read)
     }
 
-    /// Reads rooms, and returns their place in the text.
+    /// Reads rooms, and returns them with their positions in the text.
     fn placed(
         text: &str,
         base_dir: &Path,
@@ -159,13 +160,13 @@ impl RoomFile {
         Self { place: path.span(), path: folder.join(path.into_inner()) }
     }
 
-    /// Returns its name, as tables have it.
+    /// Returns the name of the file, as in tables.
     pub fn name(&self) -> String {
         self.path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
     }
 }
 
-/// A log in two rooms would be left out and left in.
+/// Rejects a log in two rooms, which would be left out and left in at the same time.
 fn refuse_twins(rooms: &[Room]) -> Result<(), ConfigError> {
     let mut seen: BTreeMap<String, &str> = BTreeMap::new();
     for room in rooms {

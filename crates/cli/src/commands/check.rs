@@ -35,8 +35,8 @@ pub fn check(registry: &Registry, config: &Path, log: Option<&Path>, format: For
         // Told before the log is tried, for a log that does not fit changes nothing about the config.
         let mut distances = distances.as_ref().map(ToString::to_string).unwrap_or_default();
         if !distances.is_empty() && uses.contains(&Input::Laser.name()) {
-            distances += "  without a laser scanner it sees nobody outside of the view of its camera, beside it or \
-                          behind it\n";
+            distances += "  without a laser scanner it sees no people outside the view of its \
+                          camera, such as beside or behind it\n";
         }
         print(&format!("{}: valid; {}\n{distances}", config.display(), in_words(&needs, &uses)))?;
         for note in file.notes()? {
@@ -123,11 +123,13 @@ fn unsuited(camera_height_m: Option<f64>, fit: Option<&Fit>, suits: &Suits) -> O
 /// Returns what the camera does not see in a line.
 fn told_zone(zone: &BlindZone) -> String {
     let floor = match zone.floor_m {
-        Some(floor_m) => format!("no floor nearer than {floor_m:.2} m before the footprint"),
+        Some(floor_m) => format!("no floor nearer than {floor_m:.2} m in front of the footprint"),
         None => "no floor".to_owned(),
     };
     let degrees = zone.field_of_view_deg;
-    format!("  its camera sees {floor}, and {degrees:.0} degrees in width\n")
+    format!(
+        "  its camera sees {floor}, and has a horizontal field of view of {degrees:.0} degrees\n"
+    )
 }
 
 /// Tries the first frames of the log.
@@ -194,6 +196,6 @@ fn in_words(needs: &[&str], uses: &[&str]) -> String {
     if uses.is_empty() {
         format!("needs {needs}")
     } else {
-        format!("needs {needs}; uses {} where the log has it", uses.join(" and "))
+        format!("needs {needs}; uses {} if the log has it", uses.join(" and "))
     }
 }

@@ -22,7 +22,7 @@ const SCHEMA: &str = "the schema";
 
 /// Example of the plugin sections of a config.
 const PLUGIN_SECTIONS: &str = "\
-# The plugins (see `tagalong list`). The settings of each one stand in `config`; `tagalong config
+# The plugins (see `tagalong list`). The settings of each one are in `config`; `tagalong config
 # NAME` prints them.
 # [[detectors]]
 # plugin = \"depth-template\"
@@ -70,7 +70,7 @@ pub fn schema(registry: &Registry) -> Outcome {
 
 fn find<'a>(registry: &'a Registry, name: &str) -> Result<&'a PluginInfo, Failure> {
     registry.find(name).map_err(|error| {
-        Failure::usage(format!("{error}; or `{PIPELINE}` for everything around the plugins"))
+        Failure::usage(format!("{error}; or `{PIPELINE}` for all settings outside the plugins"))
     })
 }
 

@@ -164,8 +164,8 @@ fn no_place_reported(args: &EvalArgs) -> Failure {
     let shown = args.tracks.display();
     Failure::usage(match args.similarity {
         SimilarityChoice::Iou => format!(
-            "{shown} has positions and no boxes; compare places (--similarity metres), or give the \
-             folder of the run"
+            "{shown} has positions and no boxes; compare positions (--similarity metres), or give \
+             the folder of the run"
         ),
         SimilarityChoice::Metres => format!(
             "{shown} has boxes and no positions; compare boxes (--similarity iou), or give the folder \
@@ -186,8 +186,8 @@ fn refused(args: &EvalArgs, error: &EvalError) -> Failure {
 const USUAL_HZ: f64 = 30.0;
 
 /// Note on tracks for which LAMR and AP are meaningless.
-const CONSTANT_SCORES: &str = "all reports have the same score; LAMR and AP mean nothing then: \
-                               no threshold tells sure reports from unsure ones";
+const CONSTANT_SCORES: &str = "all reports have the same score; LAMR and AP mean nothing then: no \
+                               threshold separates reliable reports from unreliable ones";
 
 /// Printed result: the figures, the rules and the notes.
 #[derive(Serialize)]
@@ -228,8 +228,8 @@ fn judged(args: &EvalArgs, upper_body: bool) -> Result<Judged, Failure> {
     // No camera pose relates the two frames, so a distance would mean nothing.
     if args.similarity == SimilarityChoice::Metres && truth.is_kitti() && tracks.in_robot_frame {
         return Err(Failure::usage(
-            "KITTI gives places in the camera's frame and the tracks theirs in the robot's: \
-             compare boxes (--similarity iou), or give tracks as KITTI labels",
+            "KITTI gives positions in the camera's frame, the tracks in the robot's: compare boxes \
+             (--similarity iou), or give tracks as KITTI labels",
         ));
     }
     let mut notes = std::mem::take(&mut truth.notes);
@@ -249,7 +249,10 @@ fn longer(args: &EvalArgs, known: u32, tracks: &Tracks) -> Option<String> {
     let (&last, _) = tracks.reports.last_key_value()?;
     let shown = args.tracks.display();
     (last > known).then(|| {
-        format!("{shown}: goes on to frame {last}, and the last frame known is {known}; all count")
+        format!(
+            "{shown}: continues to frame {last}, but the last known frame is {known}; all of \
+             them count"
+        )
     })
 }
 
@@ -314,14 +317,14 @@ fn no_place(args: &EvalArgs, truth: &TruthFile) -> Failure {
     let shown = args.truth.display();
     Failure::usage(match args.similarity {
         SimilarityChoice::Iou => {
-            format!("{shown} has people without a box; compare places (--similarity metres)")
+            format!("{shown} has people without a box; compare positions (--similarity metres)")
         }
         SimilarityChoice::Metres if truth.needs_pose() => format!(
-            "{shown} gives heads in the camera's frame, and where the camera was is not known; \
+            "{shown} gives heads in the camera's frame, but the pose of the camera is not known; \
              name the log with --log LOG.mcap"
         ),
         SimilarityChoice::Metres => {
-            format!("{shown} has people without a place; compare boxes (--similarity iou)")
+            format!("{shown} has people without a position; compare boxes (--similarity iou)")
         }
     })
 }

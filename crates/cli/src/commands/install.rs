@@ -75,7 +75,7 @@ impl Install<'_> {
                 let _ = writeln!(out, "`tagalong run LOG` takes it for a log with colour alone");
                 let _ = writeln!(
                     out,
-                    "`tagalong run {name}{WITH_DEPTH} LOG` joins it with depth, where a log has both"
+                    "`tagalong run {name}{WITH_DEPTH} LOG` joins it with depth, if a log has both"
                 );
                 let _ = writeln!(out, "a config names it: model = \"{name}\"");
             }
@@ -118,7 +118,8 @@ impl Install<'_> {
             name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-');
         if name.ends_with(WITH_DEPTH) {
             return Err(Failure::usage(format!(
-                "`{name}` ends as the config that joins a network with depth: give another --name"
+                "the end of `{name}` is reserved for the config that joins a network with depth: \
+                 give another --name"
             )));
         }
         if ConfigFile::built_in_names().any(|builtin| builtin == name) {
@@ -128,8 +129,8 @@ impl Install<'_> {
         }
         if name.is_empty() || !is_plain {
             return Err(Failure::usage(format!(
-                "a network is called by lower-case letters, digits and `-`, not `{name}`: give \
-                 another --name"
+                "the name of a network has lower-case letters, digits and `-` only, unlike \
+                 `{name}`: give another --name"
             )));
         }
         Ok(name)

@@ -300,7 +300,10 @@ impl KnownEmbedding {
         let convention = self.network.convention();
         let name = json!(file.to_string_lossy());
         let numbers = self.numbers;
-        let _ = writeln!(out, "# kind     re-identification: a person is {numbers} numbers");
+        let _ = writeln!(
+            out,
+            "# kind     re-identification: an embedding of {numbers} numbers per person"
+        );
         describe_input(self.network.input(), &convention.preparation(), out);
         let _ = writeln!(out, "# time     {:.1} ms a person, on one thread", self.call_ms);
         let _ = write!(out, "\n[appearance]\nmodel = {name}\n");

@@ -68,7 +68,7 @@ pub(crate) fn is_known_network(name: &str) -> bool {
 
 /// Returns the known and the installed networks as a text.
 pub(super) fn as_text() -> String {
-    let mut out = String::from("Networks that are known to work, to be had from their authors:\n");
+    let mut out = String::from("Networks that are known to work, available from their authors:\n");
     for network in &KNOWN.network {
         let KnownNetwork { name, file, finds, licence, published, call_ms, .. } = network;
         let mb = network.bytes as f64 / 1e6;
@@ -79,13 +79,13 @@ pub(super) fn as_text() -> String {
             let _ = writeln!(
                 out,
                 "  {log:<18} HOTA {hota:.3}, recall {recall:.3}, {false_positives_per_frame:.2} \
-                 false positives a frame"
+                 false positives per frame"
             );
         }
     }
     let _ = write!(
         out,
-        "\nThe figures are those of `{}`, with depth where the log has it.\n",
+        "\nThe figures are those of `{}`, with depth if the log has it.\n",
         KNOWN.command
     );
     let default = default_network();

@@ -40,7 +40,7 @@ pub(super) fn choose(
     if name == WITHOUT_NETWORK {
         say(
             "a neural network finds more people in colour: `tagalong model --list` names some, and \
-             `tagalong model --install FILE.onnx` makes this command take one",
+             after `tagalong model --install FILE.onnx` this command takes it",
         );
     }
     Ok(config)
@@ -50,11 +50,13 @@ pub(super) fn choose(
 /// recorded logs are said to find more.
 fn joined_line(joined: &str, has_figures: bool) -> String {
     let gain = if has_figures {
-        "finds more people, and mixes up more of them in a crowd"
+        "finds more people, but confuses more of them in a crowd"
     } else {
         "joins your network with depth"
     };
-    format!("`tagalong run {joined} LOG` {gain}; it takes a call of the network per frame longer")
+    format!(
+        "`tagalong run {joined} LOG` {gain}; each frame takes longer by one call of the network"
+    )
 }
 
 #[cfg(test)]
@@ -67,7 +69,7 @@ mod tests {
         let known = joined_line("yolox-nano-depth", true);
         assert!(
             known.starts_with(
-                "`tagalong run yolox-nano-depth LOG` finds more people, and mixes up more"
+                "`tagalong run yolox-nano-depth LOG` finds more people, but confuses more"
             ),
             "{known}"
         );

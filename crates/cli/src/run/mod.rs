@@ -168,8 +168,8 @@ impl Job {
 }
 
 /// Note on a log that lacks a source of the controller of the config that was chosen for it.
-const WITHOUT_COMMANDS: &str = "the log lacks what a controller needs (odometry, or a sensor of obstacles): its \
-                                people are tracked, and nobody is followed";
+const WITHOUT_COMMANDS: &str = "the log lacks an input of the controller (odometry, or an obstacle \
+                                sensor): its people are tracked, but none is followed";
 
 /// Returns the failure of a log that lacks a source of the controller, with the command and the config that
 /// track the log all the same.
@@ -234,12 +234,12 @@ fn serve(
         ))
     })?;
     say(&format!(
-        "live: open {} in a browser; whoever has this address sees the page",
+        "live: open {} in a browser; anyone with this address sees the page",
         live.address()
     ));
     if !at.ip().is_loopback() {
-        say("live: others in this network who know the address see the images; open it there \
-             by the number of this computer in place of 0.0.0.0");
+        say("live: anyone in this network with the address sees the images; on another computer, \
+             replace 0.0.0.0 by the IP address of this one");
     }
     Ok(live)
 }
@@ -470,13 +470,10 @@ fn no_frame(report: &RunReport, args: &RunArgs) -> String {
     let telling = report.counters.iter().filter(|(name, _)| !NO_REASON.contains(&name.as_str()));
     let reasons: Vec<String> =
         telling.map(|(name, count)| format!("{} {count}", name.replace('_', " "))).collect();
-    let why = if reasons.is_empty() {
-        "it has no image (or scan) that could make one".to_owned()
-    } else {
-        reasons.join(", ")
-    };
+    let why =
+        if reasons.is_empty() { "it has no image or scan".to_owned() } else { reasons.join(", ") };
     let name = &report.log.name;
-    format!("not one frame could be made of {name}: {why}; `{}` tells more", doctor(report, args))
+    format!("no frame could be made from {name}: {why}; `{}` tells more", doctor(report, args))
 }
 
 /// Returns the exit code, and the reason for a failure.

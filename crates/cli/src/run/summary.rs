@@ -141,8 +141,8 @@ fn times(out: &mut String, timings: &Timings, period_ms: Option<f64>, args: &Run
         let log = quoted(&args.log().display().to_string());
         let _ = writeln!(
             out,
-            "  {slow};\n  `tagalong doctor {log}` prints the time of each pipeline; a network may run in every \
-             Nth frame (`every = N` beside its `plugin`)"
+            "  {slow};\n  `tagalong doctor {log}` prints the time of each pipeline; a network can \
+             run in every Nth frame only (`every = N` beside its `plugin`)"
         );
     }
 }
@@ -164,13 +164,13 @@ fn files(out: &mut String, folder: &Path, has_images: bool, overlay: bool) {
     let mcap = quoted(&folder.join("tracks.mcap").display().to_string());
     if has_images {
         let _ =
-            writeln!(out, "  rerun {mcap}    (people in space, camera; images with --with-images)");
+            writeln!(out, "  rerun {mcap}    (people in 3D, camera; images with --with-images)");
         let _ = writeln!(out, "  Foxglove opens the same file: people in 3D, boxes in the image");
     } else {
-        let _ = writeln!(out, "  rerun {mcap}, or Foxglove: people in space");
+        let _ = writeln!(out, "  rerun {mcap}, or Foxglove: people in 3D");
         let _ = writeln!(
             out,
-            "  no camera was used: tracks-metres.csv has the people, tracks.csv no box"
+            "  no camera was used: the people are in tracks-metres.csv, and tracks.csv has no box"
         );
     }
     if overlay {

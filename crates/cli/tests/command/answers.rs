@@ -64,7 +64,7 @@ fn a_check_warns_of_a_camera_that_the_config_is_not_for() {
         fs::write(home.path().join("mine.toml"), camera).unwrap();
         answer(&["check", "mine.toml"], home.path())
     });
-    let warning = "the camera is 0.60 m high, and the config is for 0.9 to 2 m";
+    let warning = "the camera is 0.60 m high, but the config is for 0.9 to 2 m";
     assert!(low.contains(warning), "{low}");
     assert!(!high.contains("the camera is"), "{high}");
     config(home.path(), "[suits]\ncamera_height_m = [2.0, 3.0]\n");

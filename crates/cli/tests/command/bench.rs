@@ -67,17 +67,17 @@ fn a_config_for_other_cameras_is_named_once_with_its_logs() {
     home.config("high", "[suits]\ncamera_height_m = [2.0, 3.0]\n");
     let output = home.bench(&["plan", "--logs-dir", "logs", "-o", "out"]);
     let said = text(&output.stderr);
-    let expected = "note: high is by its [suits] not made for long (the camera is 1.20 m high, and the \
-                    config is for 2 to 3 m), short (";
+    let expected = "note: high is not made for long (the camera is 1.20 m high, but the config is \
+                    for 2 to 3 m), short (";
     assert_eq!(said.matches(expected).count(), 1, "{said}");
-    assert_eq!(said.matches("is by its [suits]").count(), 1, "{said}");
+    assert_eq!(said.matches("according to its [suits]").count(), 1, "{said}");
     assert!(said.contains("6 tasks planned: 3 configs on 2 logs; --configs limits them"), "{said}");
     // Several have one line.
     home.config("higher", "[suits]\ncamera_height_m = [3.0, 4.0]\n");
     let output = home.bench(&["plan", "--logs-dir", "logs", "-o", "out"]);
     let said = text(&output.stderr);
-    let expected = "note: 2 configs are by their [suits] not made for some of the logs, where tracks are \
-                    worse: high (2 logs), higher (2 logs)";
+    let expected = "note: 2 configs are not made for some of the logs according to their [suits], \
+                    and track worse there: high (2 logs), higher (2 logs)";
     assert!(said.contains(expected) && said.matches("[suits]").count() == 1, "{said}");
 }
 
@@ -121,8 +121,8 @@ fn a_log_with_which_a_pipeline_was_made_is_noted_by_its_contents() {
     let said = text(&output.stdout);
     let json = home.report("out")["notes"].to_string();
     let page = fs::read_to_string(home.path("out/report.html")).expect("a report");
-    let note = "models or settings of depth-ekf were made with hall: figures there say little about another \
-                room";
+    let note = "models or settings of depth-ekf were fitted to hall: figures there say little \
+                about other rooms";
     for form in [&said, &json, &page] {
         assert_eq!(form.matches(note).count(), 1, "{form}");
     }
@@ -347,7 +347,7 @@ fn a_log_of_scans_alone_is_not_sent_to_annotate() {
         let output = home.bench(&[&["plan", "-o", "out"][..], &arguments].concat());
         let said = text(&output.stderr);
         assert!(said.contains("scans.mcap has no truth"), "{said}");
-        assert!(said.contains("give their places as NAME.people-floor.csv"), "{said}");
+        assert!(said.contains("give their positions as NAME.people-floor.csv"), "{said}");
         assert!(!said.contains("tagalong annotate"), "{said}");
     }
 }
@@ -528,9 +528,9 @@ fn copies_of_one_log_are_no_independent_logs() {
         ok(command.output().unwrap());
     }
     let told = results_of(&home.bench(&["--logs-dir", "logs", "-o", "out"]));
-    assert!(told.contains("note: mirrored and short and twice go back to one recording"), "{told}");
+    assert!(told.contains("note: mirrored and short and twice come from one recording"), "{told}");
     let copies = serde_json::json!([["mirrored", "short", "twice"]]);
     assert_eq!(home.report("out")["copies"], copies);
     let page = fs::read_to_string(home.path("out/report.html")).unwrap();
-    assert!(page.contains("mirrored and short and twice go back to one recording"));
+    assert!(page.contains("mirrored and short and twice come from one recording"));
 }

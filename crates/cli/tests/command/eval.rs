@@ -173,7 +173,11 @@ fn tracks_of_a_run_that_was_stopped_are_noted() {
         fs::write(&report, written).unwrap();
         let said =
             results_of(&in_home(folder.path(), &["--truth", "walk.people.csv", "--tracks", "out"]));
-        assert_eq!(said.contains("the run is not whole (stopped by signal 2)"), is_noted, "{said}");
+        assert_eq!(
+            said.contains("the run is incomplete (stopped by signal 2)"),
+            is_noted,
+            "{said}"
+        );
     }
 }
 
@@ -402,7 +406,7 @@ fn tracks_that_go_on_without_a_known_end_are_said() {
     let said = json(&in_home(folder.path(), &files));
     assert_eq!(said["frames"].as_u64(), Some(9));
     let notes = said["notes"].to_string();
-    assert!(notes.contains("goes on to frame 9, and the last frame known is 2"), "{notes}");
+    assert!(notes.contains("continues to frame 9, but the last known frame is 2"), "{notes}");
     assert!(notes.contains("30 frames a second are assumed"), "{notes}");
     let stated = json(&in_home(folder.path(), &[&files[..], &["--rate", "30"]].concat()));
     assert!(!stated["notes"].to_string().contains("assumed"), "{stated}");

@@ -153,9 +153,9 @@ fn check_says_what_is_needed_and_what_is_used() {
     let named_topic = format!("{}[input]\ndepth_topic = \"/depth\"\n", config("rgbd-compressive"));
     for (config, words) in [
         (config("mono"), "valid; needs colour\n"),
-        (config("rgbd-compressive"), "needs colour; uses depth where the log has it"),
+        (config("rgbd-compressive"), "needs colour; uses depth if the log has it"),
         (named_topic, "valid; needs colour and depth\n"),
-        (config("follow-depth"), "valid; needs depth and odometry; uses colour and laser where"),
+        (config("follow-depth"), "valid; needs depth and odometry; uses colour and laser if"),
         (
             format!("{}\n{bumper}", config("follow-depth")),
             "valid; needs depth and obstacle-sources and odometry; uses colour",

@@ -73,7 +73,7 @@ fn a_log_of_which_no_frame_can_be_made_is_no_success() {
     config(home.path(), "[limits]\nimage_side_px = 8");
     let args = ["run", "nearest.toml", "good.mcap"];
     let told = messages_of(&own_plugin().args(args).current_dir(home.path()).output().unwrap(), 1);
-    assert!(told.contains("not one frame could be made of good.mcap: "), "{told}");
+    assert!(told.contains("no frame could be made from good.mcap: "), "{told}");
     assert!(told.contains("images too large 3"), "{told}");
     let doctor = "`tagalong doctor nearest.toml good.mcap` tells more";
     assert!(told.contains(doctor), "{told}");

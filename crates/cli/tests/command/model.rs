@@ -229,7 +229,7 @@ fn a_network_for_reidentification_is_described_by_its_section() {
         &tagalong().args(["model", "reid.onnx"]).current_dir(home.path()).output().unwrap(),
     );
     for part in [
-        "re-identification: a person is 256 numbers",
+        "re-identification: an embedding of 256 numbers per person",
         "128 x 256 pixels, stretched",
         "BGR",
         "ms a person",

@@ -21,7 +21,7 @@ pub fn damage(evidence: &Evidence) -> Option<Finding> {
     let lost: Vec<String> = counters.map(|(name, count)| format!("{name} {count}")).collect();
     let finding =
         Finding::new("file", Severity::Warn, format!("data was lost: {}", lost.join(", ")))
-            .why("what is damaged is skipped, and people in it are missed");
+            .why("damaged parts are skipped, and people in them are missed");
     Some(finding.remedy(format!(
         "the notes of `tagalong inspect` say what it is: {}",
         inspection.notes.join("; ")

@@ -25,10 +25,10 @@ pub fn depth(evidence: &Evidence) -> Option<Finding> {
         return None;
     }
     let Some(JudgedDepth { quality, measured_factor, unit }) = judged(evidence) else {
-        let finding = Finding::new("depth", Severity::Bad, "not one pixel has a reading")
-            .why("without depth nobody has a place");
+        let finding = Finding::new("depth", Severity::Bad, "no pixel has a reading")
+            .why("without depth people have no position");
         return Some(finding.remedy(
-            "is the depth camera switched on? which topic is it? [input] depth_topic = \"...\"",
+            "check that the depth camera is on, and name its topic: [input] depth_topic = \"...\"",
         ));
     };
     let is_disparity = is_disparity(evidence);
@@ -41,7 +41,7 @@ pub fn depth(evidence: &Evidence) -> Option<Finding> {
         .max(Severity::beyond(coarse, 0.02, 0.1));
     let by_floor = match (measured_factor, unit) {
         (Some(factor), _) => format!(
-            ", the floor at {:.2} of the distance that the height of the camera says",
+            ", the floor at {:.2} of the distance that follows from the height of the camera",
             1.0 / factor
         ),
         (None, Unit::OffFloor(floor) | Unit::NearFloor(floor)) => {
@@ -62,22 +62,22 @@ pub fn depth(evidence: &Evidence) -> Option<Finding> {
         .figure("step_m", step);
     Some(match *unit {
         Unit::Plausible | Unit::NearFloor(_) => finding
-            .why("people in holes, or between coarse steps, have no shape")
+            .why("people have no shape where readings are missing or their steps are coarse")
             .remedy("dark or shiny surfaces, sunlight, the camera's own range: look at the pictures; a stereo config may do better"),
         Unit::Unusual | Unit::OffMedian if is_disparity => finding
             .why("people are looked for between half a metre and some metres: the unit may be wrong")
             .remedy(better_geometry(quality.median_m)),
         Unit::Measured(factor) => finding
-            .why("by the floor and the height of the camera the unit is wrong")
+            .why("the floor contradicts the height of the camera: the unit is wrong")
             .remedy(format!(
                 "[input] depth_unit_m = {}",
                 written_unit_m(taken_unit_m(evidence) * factor)
             )),
         Unit::OffFloor(floor) => finding
-            .why("no robot's camera is at this distance from the floor: the unit is wrong")
+            .why("no robot has its camera this far above the floor: the unit is wrong")
             .remedy(units_by_height(taken_unit_m(evidence), &floor)),
         Unit::OffMedian => finding
-            .why("no room is as near or as far: the unit is wrong")
+            .why("no room has its surfaces this near or this far: the unit is wrong")
             .remedy(unit_by_median(taken_unit_m(evidence), quality.median_m)),
         Unit::Unusual => finding
             .why("people are looked for between half a metre and some metres: the unit may be wrong")
@@ -182,7 +182,7 @@ fn units_by_height(taken_m: f64, floor: &Ground) -> String {
         follows.push(format!("{metre} for each metre of its height above the floor"));
     }
     format!(
-        "give the height of the camera, with which the floor tells the unit:\n[input.camera]\n\
+        "give the height of the camera, so that the unit follows from the floor:\n[input.camera]\n\
          height_m = ...  # measure it\npitch_down_deg = {:.1}\nroll_deg = {:.1}\n\
          or the unit, [input] depth_unit_m = {}",
         floor.pitch_down_rad().to_degrees(),
@@ -197,15 +197,15 @@ fn unit_by_median(taken_m: f64, median_m: f64) -> String {
     let tens = (USUAL_MEDIAN_M / median_m).log10().round();
     let better = written_unit_m(taken_m * 10f64.powf(tens));
     format!(
-        "[input] depth_unit_m = {better}\nwith which half of the readings are within {:.1} m; no floor \
-         is seen that tells the unit more exactly",
+        "[input] depth_unit_m = {better}\nwhich puts half of the readings within {:.1} m; no floor is \
+         visible from which the unit would follow more exactly",
         median_m * 10f64.powf(tens)
     )
 }
 
 /// Remedy where nothing tells the unit.
-const UNIT_BY_THING: &str = "is the scene as near or as far as that? else set [input] depth_unit_m, in metres per unit; no \
-     floor is seen that tells it";
+const UNIT_BY_THING: &str = "is the scene really this near or this far? if not, set [input] \
+     depth_unit_m, in metres per unit; no floor is visible from which it would follow";
 
 /// Returns true for depth in floating-point numbers, which are metres by convention.
 fn is_float(evidence: &Evidence) -> bool {
@@ -297,7 +297,7 @@ mod tests {
     #[test]
     fn a_unit_by_the_median_alone_is_a_power_of_ten() {
         let told = unit_by_median(0.001, 350.0);
-        assert!(told.starts_with("[input] depth_unit_m = 0.00001\nwith which half"), "{told}");
-        assert!(told.contains("within 3.5 m; no floor is seen"), "{told}");
+        assert!(told.starts_with("[input] depth_unit_m = 0.00001\nwhich puts half"), "{told}");
+        assert!(told.contains("within 3.5 m; no floor is visible"), "{told}");
     }
 }

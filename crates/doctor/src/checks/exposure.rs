@@ -27,9 +27,9 @@ pub fn exposure(evidence: &Evidence) -> Option<Finding> {
         .figure("black", black)
         .figure("saturated", white)
         .figure("blind_images", blind as f64)
-        .why("nobody can be seen where an image is black or white");
+        .why("people are invisible where an image is black or white");
     let remedy = if black >= white {
-        "expose longer: lens cap, driver, auto exposure?"
+        "expose longer: check lens cap, driver and auto exposure"
     } else {
         "expose shorter, or turn away from the light"
     };

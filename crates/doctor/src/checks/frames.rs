@@ -38,8 +38,9 @@ pub fn frames(evidence: &Evidence) -> Option<Finding> {
     if upright || camera.panorama().is_some() {
         return ok(format!("{} hangs below {}", name, facts.robot_frame));
     }
-    let measured =
-        format!("by tf the frame {name} looks {pitch:.0} degrees down, rolled by {roll:.0}");
+    let measured = format!(
+        "according to tf the frame {name} looks {pitch:.0} degrees down, rolled by {roll:.0}"
+    );
     let finding = Finding::new("frames", Severity::Bad, measured)
         .figure("pitch_down_deg", pitch)
         .figure("roll_deg", roll)
@@ -61,7 +62,7 @@ fn cut_scanner(evidence: &Evidence, scanner: &str) -> Finding {
         (format!("tf does not connect `{scanner}` with `{robot}`"), "publish the missing transform")
     };
     Finding::new("frames", Severity::Bad, format!("{measured}; {}", facts.camera_source))
-        .why("without the transform the place of the scanner on the robot is not known")
+        .why("without the transform the position of the scanner on the robot is not known")
         .remedy(remedy)
 }
 
@@ -76,7 +77,7 @@ fn cut(evidence: &Evidence, camera: &str) -> Finding {
     let hint = nearest(lost, names.iter().copied()).filter(|near| *near != lost);
     let hint = hint.map(|near| format!(" (did you mean `{near}`?)")).unwrap_or_default();
     let measured = if names.contains(lost) {
-        format!("tf falls apart into {} trees, below {}", roots.len(), roots.join(", "))
+        format!("tf consists of {} separate trees, below {}", roots.len(), roots.join(", "))
     } else {
         format!("tf does not know the frame `{lost}`{hint}; its roots are {}", roots.join(", "))
     };
@@ -93,7 +94,7 @@ fn cut(evidence: &Evidence, camera: &str) -> Finding {
     };
     Finding::new("frames", severity, format!("{measured}; {} stands in", facts.camera_source))
         .figure("trees", roots.len() as f64)
-        .why("without the transform nobody knows how high the camera is, and how it is tilted")
+        .why("without the transform the height and the tilt of the camera are not known")
         .remedy(remedy)
 }
 

@@ -40,7 +40,7 @@ pub fn heads(evidence: &Evidence) -> Option<Finding> {
     let mut severity = Severity::beyond(near, NEAR_M, BAD_NEAR_M);
     let mut measured = format!("heads leave the image nearer than {near:.1} m");
     if near <= NEAREST_M {
-        measured = "heads stay in the image however near".to_owned();
+        measured = "heads are in the image at any small distance".to_owned();
     }
     if far < FAR_M {
         measured += &format!(", and farther than {far:.1} m");
@@ -59,8 +59,7 @@ pub fn heads(evidence: &Evidence) -> Option<Finding> {
     Some(finding.remedy(remedy(camera)))
 }
 
-const WHY: &str =
-    "most detectors look for heads; of nearer people trunk and legs alone are visible";
+const WHY: &str = "most detectors look for heads; only trunk and legs of nearer people are visible";
 
 /// Returns the distances straight ahead from which the whole of a head is in the image, m; `None` if
 /// there are none.

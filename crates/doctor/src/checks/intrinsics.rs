@@ -21,7 +21,7 @@ pub fn intrinsics(evidence: &Evidence) -> Option<Finding> {
     let Lens::Pinhole(lens) = &camera.lens else { return None };
     if evidence.inspection.facts.calibration_topic.is_none() {
         let remedy = "record its camera_info, and name it:\n[input] colour_info_topic = \"...\"";
-        let measured = "none in the log: a view of 53 degrees is assumed".to_owned();
+        let measured = "none in the log: a field of view of 53 degrees is assumed".to_owned();
         return Some(about_lens(Severity::Warn, measured).remedy(remedy));
     }
     let width = camera.width as f64;
@@ -33,7 +33,7 @@ pub fn intrinsics(evidence: &Evidence) -> Option<Finding> {
     let severity =
         Severity::beyond(off, 0.12, 0.2).max(Severity::beyond(narrow, 1.0, f64::INFINITY));
     let measured = format!(
-        "{}x{}, a view of {view:.0} degrees, centre off by {:.0} %",
+        "{}x{}, a field of view of {view:.0} degrees, centre off by {:.0} %",
         camera.width,
         camera.height,
         100.0 * off
@@ -48,5 +48,5 @@ pub fn intrinsics(evidence: &Evidence) -> Option<Finding> {
 /// A finding on the intrinsics, with what they decide.
 fn about_lens(severity: Severity, measured: String) -> Finding {
     Finding::new("intrinsics", severity, measured)
-        .why("sizes and places in metres follow from the focal length")
+        .why("sizes and positions in metres follow from the focal length")
 }

@@ -44,7 +44,7 @@ pub fn laser(evidence: &Evidence) -> Option<Finding> {
     Some(finding.remedy(if is_high {
         "mount the scanner at the height of legs, or correct its transform"
     } else {
-        "few rays come back: is the window clean, the range set right, the driver's filter too strict?"
+        "few rays have a return: clean the window; check the range that is set and the driver's filter"
     }))
 }
 

@@ -59,7 +59,9 @@ fn remedy(evidence: &Evidence) -> String {
              with\n{change}",
             coverage.unexplained, coverage.blobs
         ),
-        None => "look at the pictures (-o DIR), and at the funnel below: which test dropped them?"
-            .to_owned(),
+        None => {
+            "look at the pictures (-o DIR), and see in the funnel below which test dropped them"
+                .to_owned()
+        }
     }
 }

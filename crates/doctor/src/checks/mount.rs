@@ -28,7 +28,8 @@ pub fn mount(evidence: &Evidence) -> Option<Finding> {
         .max(Severity::beyond(pitch.abs(), 3.0, 6.0))
         .max(Severity::beyond(roll.abs(), 3.0, 6.0));
     let measured = format!(
-        "{told:.2} m high by {}; by the floor {height:+.2} m, {pitch:+.1} degrees further down, {roll:+.1} of roll",
+        "{told:.2} m high by {}; the floor says {height:+.2} m, {pitch:+.1} degrees further down, \
+         {roll:+.1} of roll",
         evidence.inspection.facts.camera_source
     );
     let finding = Finding::new("mount", severity, measured)
@@ -43,8 +44,8 @@ pub fn mount(evidence: &Evidence) -> Option<Finding> {
         && !(0.7..1.4).contains(&(seen / told));
     Some(finding.remedy(if scaled {
         format!(
-            "the tilt agrees and the height does not: depth may be in another unit, {:.3} of what is \
-             taken:\n[input] depth_unit_m = ...\nelse\n{}",
+            "the tilt agrees, but the height does not: depth may be in another unit, {:.3} of the \
+             assumed one:\n[input] depth_unit_m = ...\nelse\n{}",
             told / seen,
             mount_lines(evidence)
         )

@@ -12,7 +12,7 @@ pub fn needs(evidence: &Evidence) -> Option<Finding> {
                        people without commands to a robot";
             (Severity::Bad, why)
         } else {
-            let why = "`tagalong run LOG` tracks people all the same; a robot refuses to drive by this \
+            let why = "`tagalong run LOG` still tracks people; a robot refuses to drive with this \
                        pipeline";
             (Severity::Warn, why)
         };
@@ -24,7 +24,7 @@ pub fn needs(evidence: &Evidence) -> Option<Finding> {
             let measured = format!("the config needs {needed}; nothing in the log can be used");
             let finding = Finding::new("needs", Severity::Bad, measured);
             return Some(
-                finding.remedy("`tagalong inspect` says of each topic why it cannot be used"),
+                finding.remedy("`tagalong inspect` prints for each topic why it cannot be used"),
             );
         }
         let measured = format!("the config needs {needed}; the log has {usable}");

@@ -32,7 +32,7 @@ pub fn odometry(evidence: &Evidence) -> Option<Finding> {
         // Readings in a wrong unit are beyond the walls, or between floor and ceiling at random.
         _ if all_moves && is_unit_in_doubt(evidence) => {
             let measured =
-                "not known: the unit of depth is in doubt, by which a camera that moves is told";
+                "not known: motion of the camera is measured from depth, whose unit is in doubt";
             (Severity::Unknown, measured.to_owned())
         }
         _ if all_moves => {
@@ -59,7 +59,7 @@ pub fn odometry(evidence: &Evidence) -> Option<Finding> {
             // A scanner alone cannot tell, so nothing is said about how right that is.
             None => (
                 Severity::Unknown,
-                "none: the robot is taken to stand still; if it drives, record its odometry"
+                "none: the robot is assumed to stand still; if it drives, record its odometry"
                     .to_owned(),
             ),
         },
@@ -67,11 +67,12 @@ pub fn odometry(evidence: &Evidence) -> Option<Finding> {
     let finding = Finding::new("odometry", severity, measured)
         .figure("driven_m", metres)
         .figure("turned_deg", evidence.driven.turned_rad.to_degrees())
-        .why("while the robot moves and does not say so, people seem to move instead");
+        .why("if the odometry lacks a motion of the robot, people seem to move instead");
     let name = "name it:\n[input] odometry_topic = \"/odom\"";
     Some(finding.remedy(if jumps > gaps {
         format!(
-            "is it in metres, of one publisher, and without resets? else record another one, and {name}"
+            "check that it is in metres, from one publisher and without resets; otherwise record \
+             another one, and {name}"
         )
     } else {
         format!("record the odometry throughout, and {name}")
@@ -88,7 +89,7 @@ fn unsteady(gaps: u64, jumps: u64, way: &str, stands: bool) -> String {
     if jumps > 0 {
         parts.push(format!("jumps by more than a metre at {}", counted(jumps, "frame")));
     }
-    let way = if stands { "the way between them is not known" } else { way };
+    let way = if stands { "the motion between them is not known" } else { way };
     format!("{}; {way}", parts.join(", "))
 }
 
@@ -101,7 +102,7 @@ mod tests {
         let jumps = unsteady(0, 19, "the robot stands still", true);
         assert_eq!(
             jumps,
-            "jumps by more than a metre at 19 frames; the way between them is not known"
+            "jumps by more than a metre at 19 frames; the motion between them is not known"
         );
         let both = unsteady(3, 1, "1.8 m driven, 0 degrees turned", false);
         assert!(both.starts_with("silent at 3 frames, jumps by"), "{both}");

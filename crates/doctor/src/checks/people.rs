@@ -11,8 +11,10 @@ pub fn people(evidence: &Evidence) -> Option<Finding> {
     let trial = &evidence.trial;
     if let Some(why) = &trial.failure {
         let finding = Finding::new("people", Severity::Bad, format!("the pipeline failed: {why}"))
-            .why("a plugin does not go on after a frame that it cannot use");
-        return Some(finding.remedy("see the findings above; else this is a defect of the plugin"));
+            .why("a plugin stops at a frame that it cannot use");
+        return Some(finding.remedy(
+            "see the findings above; if none explains it, this is a defect of the plugin",
+        ));
     }
     if evidence.refusal.is_some() {
         let finding = Finding::new("people", Severity::Bad, "the pipeline did not run")
@@ -34,8 +36,8 @@ pub fn people(evidence: &Evidence) -> Option<Finding> {
     let remedy = match frames {
         0 => "see the findings above",
         _ => {
-            "see the findings above; then the funnel below, from the top: -o DIR shows what each \
-              test dropped; a longer look: --frames N"
+            "see the findings above; then the funnel below, from the top: -o DIR draws what each \
+             test dropped, and --frames N takes more frames"
         }
     };
     let finding = Finding::new("people", severity, measured)

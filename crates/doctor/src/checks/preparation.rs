@@ -33,12 +33,17 @@ fn judge(tried: &Preparations) -> Finding {
     match better {
         Some(best) => finding
             .figure("other_probability", best.score)
-            .why("a network sees nothing in images whose colours, scale or place are not its own")
+            .why(
+                "a network finds nothing if the colours, scale or position of its input differ \
+                 from those of its training",
+            )
             .remedy(best.change.clone()),
-        None => finding.why("no order of colours, scale and place makes it find people").remedy(
-            "look for people in the log; then `classes`, `discover_score`, or another export: \
-             `tagalong model FILE.onnx`",
-        ),
+        None => {
+            finding.why("it finds no people with any order of colours, scale and position").remedy(
+                "check that there are people in the log; then try `classes`, `discover_score`, or \
+                 another export: `tagalong model FILE.onnx`",
+            )
+        }
     }
 }
 

@@ -42,7 +42,7 @@ pub fn rate(evidence: &Evidence) -> Option<Finding> {
         format!("{hz:.1} {} a second: a person walks {walked:.2} m between two", kind_of(topic)),
     );
     let finding = finding.figure("rate_hz", hz).why(
-        "a person who goes far between two of them fits no track, and tracks are confirmed late",
+        "a person who walks far between two of them matches no track, and tracks are confirmed late",
     );
     Some(finding.remedy(format!(
         "record 5 a second or more; else\n[associator.config] gate_m = {:.1}\n[manager.config] \

@@ -45,9 +45,10 @@ pub fn reading(evidence: &Evidence) -> Option<Finding> {
     let finding = Finding::new("frames-read", severity, measured)
         .figure("frames", made as f64)
         .figure("wanted", wanted as f64)
-        .why("an image that makes no frame is not looked at by any pipeline");
+        .why("no pipeline processes an image that makes no frame");
     Some(finding.remedy(
-        "the notes of `tagalong inspect` say why; a depth image far in time: the finding `skew`",
+        "the notes of `tagalong inspect` say why; for a depth image far away in time see the \
+         finding `skew`",
     ))
 }
 

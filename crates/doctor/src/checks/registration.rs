@@ -28,7 +28,8 @@ pub fn registration(evidence: &Evidence) -> Option<Finding> {
     // have any offset along them, before a camera near it.
     if offset.contrast < 0.25 || error > SURE * off.max(16.0 * scale) {
         let measured = format!(
-            "outlines in depth and colour do not tell ({dx:+}, {dy:+} px, give or take {error:.1})"
+            "not measurable from the outlines in depth and colour ({dx:+}, {dy:+} px, give or \
+             take {error:.1})"
         );
         let finding = Finding::new("registration", Severity::Unknown, measured);
         return Some(with_figures(finding, &offset));
@@ -43,7 +44,8 @@ pub fn registration(evidence: &Evidence) -> Option<Finding> {
     let severity = Severity::beyond(deviation, limits[0], limits[1]);
     let finding = Finding::new("registration", severity, measured);
     let finding = with_figures(finding, &offset).why(
-        "people have the depth of what is beside them: their boxes slip, and narrow things vanish",
+        "people get the depth of what is beside them: their boxes are shifted, and narrow objects \
+         vanish",
     );
     let [x, y] = evidence.input.depth_offset_px;
     Some(finding.remedy(format!(

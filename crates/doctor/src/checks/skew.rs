@@ -22,7 +22,10 @@ pub fn skew(evidence: &Evidence) -> Option<Finding> {
     let finding = Finding::new("skew", severity, measured)
         .figure("skew_ms", 1e3 * skew.median_s)
         .figure("paired", skew.paired)
-        .why("an image without its partner is not used, and one with a late partner shows people beside themselves");
+        .why(
+            "an image without its partner is not used, and with a late partner the depth of \
+             people who walk lies beside them",
+        );
     Some(finding.remedy(if share < 0.9 && late > 0.5 {
         "the two have different clocks: make the camera stamp both at capture".to_owned()
     } else if share < 0.9 && late > evidence.input.pair_tolerance_s {
@@ -33,7 +36,7 @@ pub fn skew(evidence: &Evidence) -> Option<Finding> {
     } else if share < 0.9 {
         "record both topics at the full rate".to_owned()
     } else {
-        "make the camera stamp both at capture: people who walk are this much beside themselves"
+        "make the camera stamp both at capture: the depth of people who walk is shifted by this delay"
             .to_owned()
     }))
 }

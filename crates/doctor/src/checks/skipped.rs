@@ -6,7 +6,7 @@ const SKIPPED: [(&str, &str, &str); 8] = [
     (
         "messages_not_read",
         "images in an encoding that is not read",
-        "record jpeg, rgb8 or bayer_*8 in place of it",
+        "record jpeg, rgb8 or bayer_*8 instead",
     ),
     (
         "laser_scans_without_pose",
@@ -24,11 +24,11 @@ const SKIPPED: [(&str, &str, &str); 8] = [
         "publish tf to the camera throughout, on /tf_static if it does not move on the robot, or give \
          [input.camera]",
     ),
-    ("late_frames", "images too late to be put in order", "[input] reorder_frames = 8"),
+    ("late_frames", "images that came too late to be put in order", "[input] reorder_frames = 8"),
     (
         "duplicate_frames",
         "images with the stamp of another",
-        "is the same image published twice, or a bag played in a loop?",
+        "check that no image is published twice, and that no bag is played in a loop",
     ),
     (
         "camera_info_changes",
@@ -38,8 +38,8 @@ const SKIPPED: [(&str, &str, &str); 8] = [
     (
         "disparity_pixels_invalid",
         "pixels without a valid disparity",
-        "texture, light and the range of disparities decide how many there are: look at the \
-         matcher's settings",
+        "their number depends on texture, light and the range of disparities: check the matcher's \
+         settings",
     ),
 ];
 
@@ -65,8 +65,10 @@ pub fn skipped(evidence: &Evidence) -> Option<Finding> {
     let remedies: Vec<&str> = found.iter().map(|(.., remedy)| *remedy).collect();
     let notes = evidence.inspection.notes.iter().filter(|note| note.contains("is not read"));
     let remedies: Vec<&str> = remedies.into_iter().chain(notes.map(String::as_str)).collect();
-    let finding = Finding::new("skipped", severity, measured.join(", "))
-        .why("people are missed in what is left out, and misplaced by what is out of date");
+    let finding = Finding::new("skipped", severity, measured.join(", ")).why(
+        "people in data that are left out are missed, and outdated poses or calibrations \
+         misplace people",
+    );
     Some(finding.remedy(remedies.join("\n")))
 }
 

@@ -35,17 +35,17 @@ const REPLACED: &str = "logs_without_stamps";
 
 /// Returns the finding for a topic without a stamp that is later than the one before.
 fn unset(topic: &str, used: StampSource, is_replaced: bool) -> Finding {
-    let recording = "the times of recording are taken in place of all stamps";
+    let recording = "the times of recording are used instead of all stamps";
     let (severity, taken) = match used {
         StampSource::Recording => (Severity::Ok, recording),
         StampSource::Auto if is_replaced => (Severity::Warn, recording),
-        StampSource::Auto | StampSource::Header => (Severity::Bad, "no other times are taken"),
+        StampSource::Auto | StampSource::Header => (Severity::Bad, "no other times are used"),
     };
     let measured = format!("no message of {topic} is stamped later than the one before: {taken}");
     Finding::new("stamps", severity, measured)
         .why(
-            "times of recording contain the delays of transport, so that motion is less exact; without any \
-             times there is none",
+            "times of recording include the delays of transport, so motion is less exact; without \
+             any times motion is not known",
         )
         .remedy(
             "let the driver set header.stamp when it takes the image; until then\n\
@@ -60,7 +60,7 @@ fn judge(topic: &str, timing: &Timing) -> Finding {
         let measured =
             format!("{topic}: the clock is set back by {:.2} s", timing.longest_step_back_s);
         return about_stamps(timing, Severity::Bad, measured)
-            .why("whoever was tracked before the jump is forgotten, and gets a new number")
+            .why("tracks end at the jump, and people get new IDs after it")
             .remedy(
                 "record with one clock (use_sim_time on all nodes or on none; no looping bag)",
             );
@@ -68,7 +68,7 @@ fn judge(topic: &str, timing: &Timing) -> Finding {
     if timing.longest_gap_s > (6.0 * period).max(1.0) {
         let measured = format!("{topic}: a pause of {:.2} s", timing.longest_gap_s);
         return about_stamps(timing, Severity::Warn, measured)
-            .why("tracks end when nothing is seen for long")
+            .why("tracks end if no frame comes for a long time")
             .remedy(format!("[clock] reset_gap_s = {:.1}", timing.longest_gap_s.ceil() + 1.0));
     }
     if timing.steps_back + timing.repeated > 0 {
@@ -80,7 +80,7 @@ fn judge(topic: &str, timing: &Timing) -> Finding {
             .why("messages that come later than a few others are dropped")
             .remedy("[input] reorder_frames = 8");
     }
-    let measured = format!("in order, the longest pause is {:.2} s", timing.longest_gap_s);
+    let measured = format!("in order; the longest gap is {:.2} s", timing.longest_gap_s);
     about_stamps(timing, Severity::Ok, measured)
 }
 
@@ -100,11 +100,11 @@ mod tests {
     fn stamps_that_were_never_set_are_told_with_the_times_that_are_taken() {
         let told = unset("/camera", StampSource::Auto, true);
         assert_eq!((told.id, told.severity), ("stamps", Severity::Warn));
-        assert!(told.measured.contains("the times of recording are taken"), "{}", told.measured);
+        assert!(told.measured.contains("the times of recording are used"), "{}", told.measured);
         assert!(told.remedy.unwrap().contains("[input] stamps = \"recording\""));
         let told = unset("/camera", StampSource::Auto, false);
         assert_eq!(told.severity, Severity::Bad);
-        assert!(told.measured.contains("no other times are taken"), "{}", told.measured);
+        assert!(told.measured.contains("no other times are used"), "{}", told.measured);
         assert_eq!(unset("/camera", StampSource::Header, false).severity, Severity::Bad);
         assert_eq!(unset("/camera", StampSource::Recording, false).severity, Severity::Ok);
     }

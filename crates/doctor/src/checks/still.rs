@@ -31,7 +31,7 @@ pub fn still(evidence: &Evidence) -> Option<Finding> {
     let mut measured = match coverage.still {
         0 => {
             let tracks = counted(tracks, "track");
-            format!("each of {tracks} moved or lived less than {STILL_S:.0} s")
+            format!("each of {tracks} moved, or lasted less than {STILL_S:.0} s")
         }
         still => format!(
             "{still} of {} never moved; they fill {:.0} % of the boxes",
@@ -48,7 +48,7 @@ pub fn still(evidence: &Evidence) -> Option<Finding> {
         .figure("still_tracks", coverage.still as f64)
         .figure("still_boxes_share", still_share)
         .figure("idle_boxes_share", idle_share)
-        .why("people move at some time: these are things, or people who sit or stand throughout");
+        .why("people move at some time: these are objects, or people who sit or stand throughout");
     Some(finding.remedy(remedy(evidence)))
 }
 

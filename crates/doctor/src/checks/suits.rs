@@ -18,11 +18,14 @@ fn odometry(evidence: &Evidence) -> Option<Finding> {
     if !evidence.suits.odometry || evidence.has_odometry {
         return None;
     }
-    let measured = "the log has no odometry, and the config is for a robot with it".to_owned();
-    let finding = Finding::new("suits", Severity::Bad, measured)
-        .why("motion over ground is evidence there; without odometry furniture moves like people");
+    let measured = "the log has no odometry, but the config is for a robot that has it".to_owned();
+    let finding = Finding::new("suits", Severity::Bad, measured).why(
+        "the config takes motion over ground as evidence; without odometry furniture seems \
+         to move like people",
+    );
     Some(finding.remedy(
-        "record odometry or tf from odom; or take a config without: `tagalong run LOG` chooses one",
+        "record odometry or tf from odom; or take a config that needs none: `tagalong run LOG` \
+         chooses one",
     ))
 }
 
@@ -36,7 +39,7 @@ fn baseline(evidence: &Evidence) -> Option<Finding> {
     let measured = format!("not for this pair: {}", said("m of baseline", 2, (baseline_m, range)));
     let finding = Finding::new("suits", Severity::Bad, measured)
         .figure("baseline_m", baseline_m)
-        .why("a wide pair has no depth nearby, a narrow one none far away");
+        .why("a wide baseline gives no depth nearby, and a narrow one none far away");
     Some(finding.remedy("`tagalong run LOG` chooses the config for such a pair"))
 }
 
@@ -63,7 +66,7 @@ fn camera(evidence: &Evidence) -> Option<Finding> {
     let finding = Finding::new("suits", severity, format!("{verdict}{}", facts.join("; ")))
         .figure("camera_height_m", camera.height_m())
         .figure("pitch_down_deg", camera.pitch_down_rad().to_degrees())
-        .why("settings and models were fitted to cameras in this range, and to no others");
+        .why("settings and models were fitted to cameras in this range only");
     Some(finding.remedy(
         "take a config for this height, see the first table of configs/README.md (depth-net-ekf: any \
          height); or try: `tagalong doctor LOG` compares those that fit",

@@ -9,23 +9,25 @@ use crate::FloorPoint;
 pub struct Row {
     /// Number of the scan, from 0.
     pub scan: u32,
-    /// The person at a place in the frame of the laser.
+    /// ID and position of the person in the frame of the laser.
     pub person: FloorPoint,
-    /// Position of the person in the robot frame, m; `None` where the laser's place on it is not known.
+    /// Position of the person in the robot frame, m; `None` if the pose of the laser on the robot
+    /// is not known.
     pub robot_m: Option<[f64; 2]>,
-    /// The person in the odometry frame, m; `None` without odometry.
+    /// Position of the person in the odometry frame, m; `None` without odometry.
     pub odom_m: Option<[f64; 2]>,
     /// Neither a miss nor a false alarm.
     pub ignore: bool,
-    /// True for a place that was annotated, false for one between two annotations.
+    /// True for a position that was annotated, false for one that is interpolated between two
+    /// annotations.
     pub annotated: bool,
 }
 
-/// Reads `people-floor.csv`; columns are found by name, unknown ones are passed over.
+/// Reads `people-floor.csv`. Columns are found by name; unknown ones are ignored.
 ///
 /// # Errors
 ///
-/// A missing column, something that is no number.
+/// When a column is missing, or a field is not a number.
 pub fn parse(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
     let table = Table::new(text, file)?;
     let scan = table.column("scan")?;
@@ -48,8 +50,7 @@ pub fn parse(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
     rows.collect()
 }
 
-/// Returns a place of two columns; `None` if it is not known: a column is not there, or its field is
-/// empty.
+/// Returns the position in two columns; `None` if a column is missing or its field is empty.
 fn place(
     table: &Table<'_>,
     line: &Line<'_>,

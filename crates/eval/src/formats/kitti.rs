@@ -1,6 +1,6 @@
-//! KITTI tracking labels: one object a line, blanks between, frames from 0,
-//! `frame id type truncated occluded alpha left top right bottom height width
-//! length x y z rotation_y [score]`.
+//! KITTI tracking labels: one object per line, fields separated by blanks, frames from 0, `frame id
+//! type truncated occluded alpha left top right bottom height width length x y z rotation_y
+//! [score]`.
 
 use std::io::{self, Write};
 
@@ -8,10 +8,10 @@ use super::{FormatError, Line, Timeline, lines};
 use crate::prepare::Comparison;
 use crate::types::{Region, Report, Role, Similarity, Truth};
 
-/// Unmatched reports at most this high are left out, in pixels.
+/// Unmatched reports of at most this height are left out, in pixels.
 pub const LEAST_HEIGHT_PX: f64 = 25.0;
 
-/// The comparison under KITTI's rules.
+/// Returns the comparison under KITTI's rules.
 pub fn comparison(similarity: Similarity) -> Comparison {
     Comparison { ignore_unmatched_below_px: Some(LEAST_HEIGHT_PX), ..similarity.into() }
 }
@@ -23,13 +23,13 @@ pub struct Label {
     pub line: usize,
     /// Number of the frame, from 0.
     pub frame: u32,
-    /// The object; -1 for `DontCare`.
+    /// ID of the object; -1 for `DontCare`.
     pub id: i64,
     /// The class, for example `Pedestrian`.
     pub class: String,
-    /// 0 whole, above 0 leaves the image; -1 not annotated.
+    /// 0 for a whole object, above 0 for one that leaves the image; -1 if it is not annotated.
     pub truncated: f64,
-    /// 0 visible, 1 partly, 2 largely hidden, 3 unknown; -1 not annotated.
+    /// 0 visible, 1 partly hidden, 2 largely hidden, 3 unknown; -1 not annotated.
     pub occluded: f64,
     /// Observation angle in radians.
     pub alpha: f64,
@@ -46,14 +46,14 @@ pub struct Label {
 }
 
 impl Label {
-    /// Where on the floor, as (right, forward) of the camera in metres; the
-    /// marker -1000 for "not annotated" gives nothing.
+    /// Returns the position on the floor, (right, forward) of the camera in metres; `None` for the
+    /// marker -1000, "not annotated".
     pub fn floor_m(&self) -> Option<[f64; 2]> {
         let [x, _, z] = self.position_in_camera_m;
         (x > -999.0 && z > -999.0).then_some([x, z])
     }
 
-    /// Returns the role of the label when pedestrians are scored: other classes have none, seated
+    /// Returns the role of the label when pedestrians are scored: other classes have none; seated
     /// people and those that are cut off or of unknown occlusion are ignored (the rules of
     /// TrackEval).
     pub fn pedestrian_role(&self) -> Option<Role> {
@@ -70,18 +70,18 @@ impl Label {
         self.class.eq_ignore_ascii_case("dontcare")
     }
 
-    /// True for an object that is not told apart from others: TrackEval leaves it out.
+    /// Returns true for an object without an ID of its own, which TrackEval leaves out.
     pub fn is_anonymous(&self) -> bool {
         self.id < 0 && !self.is_dont_care()
     }
 }
 
-/// Reads label lines; `file` names the text in errors. Boxes without an area stay, as in TrackEval:
-/// they match no box.
+/// Reads label lines; `file` names the text in errors. Boxes without an area are kept, as in
+/// TrackEval; they match no other box.
 ///
 /// # Errors
 ///
-/// Fewer than 17 fields, something that is no number.
+/// When a line has fewer than 17 fields, or a field is not a number.
 pub fn parse(text: &str, file: &str) -> Result<Vec<Label>, FormatError> {
     lines(text, file).map(|line| label(&line)).collect()
 }
@@ -108,8 +108,8 @@ fn label(line: &Line<'_>) -> Result<Label, FormatError> {
     })
 }
 
-/// Adds labels to a timeline as truth for pedestrians; `DontCare` becomes an ignore region, and
-/// people without an id are left out. Frames keep KITTI's numbers, from 0.
+/// Adds labels to a timeline as truth for pedestrians. `DontCare` becomes an ignore region, and
+/// people without an ID are left out. Frames keep KITTI's numbers, from 0.
 pub fn add_truths(timeline: &mut Timeline, labels: &[Label]) {
     for label in labels.iter().filter(|label| !label.is_anonymous()) {
         let frame = timeline.frame(label.frame);
@@ -123,7 +123,7 @@ pub fn add_truths(timeline: &mut Timeline, labels: &[Label]) {
     }
 }
 
-/// Adds the pedestrians among labels to a timeline as reports, without the anonymous.
+/// Adds the pedestrians among labels to a timeline as reports, except for those without an ID.
 pub fn add_reports(timeline: &mut Timeline, labels: &[Label]) {
     for label in labels {
         if !label.class.eq_ignore_ascii_case("pedestrian") || label.is_anonymous() {

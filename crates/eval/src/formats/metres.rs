@@ -1,5 +1,5 @@
-//! `tracks-metres.csv`: the places of tracks as a run writes them. The first
-//! line names the columns; frames are numbered from 1.
+//! `tracks-metres.csv`: the positions of tracks as a run writes them. The first line names the
+//! columns; frames are numbered from 1.
 
 use super::{FormatError, Line, Table};
 use crate::types::Report;
@@ -9,32 +9,32 @@ use crate::types::Report;
 pub struct Row {
     /// Line of the file, from 1.
     pub line: usize,
-    /// When, in nanoseconds.
+    /// Time, in nanoseconds.
     pub stamp_ns: i64,
     /// Number of the colour image, from 1.
     pub frame: u32,
-    /// The track.
+    /// ID of the track.
     pub id: i64,
-    /// Centre of the head in the robot frame: forward, left, up.
+    /// Centre of the head in the robot frame: forward, left, up, in metres.
     pub head_in_robot_m: [f64; 3],
     /// The same in the odometry frame; NaN where the run could not use the odometry.
     pub head_in_odom_m: [f64; 3],
-    /// Whether the track was seen in this frame.
+    /// True if the track has a detection in this frame.
     pub seen: bool,
 }
 
-/// Which frame the floor is taken from.
+/// Frame in which positions on the floor are given.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Floor {
     /// The robot frame of each moment.
     #[default]
     Robot,
-    /// The odometry frame, which stands still.
+    /// The odometry frame, which is fixed.
     Odometry,
 }
 
 impl Row {
-    /// The row as a report, with the number of its frame; the score is 1.
+    /// Returns the row as a report, with the number of its frame; the score is 1.
     pub fn report(&self, floor: Floor) -> (u32, Report) {
         let [x, y, _] = match floor {
             Floor::Robot => self.head_in_robot_m,
@@ -49,7 +49,7 @@ impl Row {
 ///
 /// # Errors
 ///
-/// A missing column or something that is no number.
+/// When a column is missing, or a field is not a number.
 pub fn parse(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
     let table = Table::new(text, file)?;
     let stamp = table.column("stamp_ns")?;
@@ -84,7 +84,7 @@ fn point(line: &Line<'_>, [x, y, z]: [usize; 3]) -> Result<[f64; 3], FormatError
     Ok([line.number(x, "x")?, line.number(y, "y")?, line.number(z, "z")?])
 }
 
-/// Refuses frames beyond the end of a sequence.
+/// Rejects frames beyond the end of a sequence.
 ///
 /// # Errors
 ///

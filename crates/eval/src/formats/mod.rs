@@ -5,9 +5,9 @@
 //! * [`kitti`]: KITTI tracking labels.
 //! * [`people`]: `people.csv`, the upper-body annotation of recordings.
 //! * [`floor`]: `people-floor.csv`, people annotated in laser scans.
-//! * [`metres`]: `tracks-metres.csv`, the places that a run writes.
+//! * [`metres`]: `tracks-metres.csv`, the positions that a run writes.
 //!
-//! Readers keep every row as it stands; a second step turns rows into frames and decides which rows
+//! Readers keep every row unchanged; a second step turns rows into frames and decides which rows
 //! count.
 
 pub mod floor;
@@ -25,7 +25,7 @@ use crate::types::{Frame, Report, Sequence, Truth};
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{file}{}: {why}", place(*.line))]
 pub struct FormatError {
-    /// The file as the caller calls it.
+    /// Name of the file for messages.
     pub file: String,
     /// 1-based line, 0 for the file as a whole.
     pub line: usize,
@@ -33,19 +33,20 @@ pub struct FormatError {
     pub why: String,
 }
 
-/// Lines of a file that were read and mean less than their writer thought.
+/// Lines of a file that were read, but probably do not mean what their writer intended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OddLines {
-    /// Number of such rows.
+    /// Number of such lines.
     pub count: usize,
-    /// The first of them, from 1.
+    /// The first of them, counted from 1.
     pub first: usize,
-    /// Lines of the file that hold something.
+    /// Number of lines of the file that are not empty.
     pub of: usize,
 }
 
 impl OddLines {
-    /// Returns those of all lines, given as numbers, that are odd; `None` without any.
+    /// Returns the odd ones among all lines, given as their numbers with true for odd; `None` if
+    /// there are none.
     pub fn among(lines: impl IntoIterator<Item = (usize, bool)>) -> Option<Self> {
         let mut odd = Vec::new();
         let mut of = 0;
@@ -57,7 +58,8 @@ impl OddLines {
     }
 }
 
-/// Keeps the first of the people with the same ID in one frame; returns the number of those left out.
+/// Keeps the first of the people with the same ID in one frame, and returns the number of those
+/// that it removes.
 pub fn keep_first_of_id<T>(people: &mut Vec<T>, frame_and_id: impl Fn(&T) -> (u64, i64)) -> usize {
     let mut seen = BTreeSet::new();
     let before = people.len();
@@ -90,12 +92,12 @@ pub struct Timeline {
 }
 
 impl Timeline {
-    /// No frames yet.
+    /// Creates a timeline without frames.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// The frame with this number, made when it is new.
+    /// Returns the frame with this number, and creates it if it is new.
     pub fn frame(&mut self, number: u32) -> &mut Frame {
         self.frames.entry(number).or_default()
     }
@@ -114,18 +116,18 @@ impl Timeline {
         }
     }
 
-    /// Returns the frames that were made, by number.
+    /// Returns the frames that exist, by number.
     pub fn into_frames(self) -> BTreeMap<u32, Frame> {
         self.frames
     }
 
-    /// The number of the last frame with anybody in it.
+    /// Returns the number of the last frame that contains people.
     pub fn last(&self) -> Option<u32> {
         self.frames.last_key_value().map(|(&number, _)| number)
     }
 
-    /// The frames `first..first + length` with evenly spaced stamps, empty ones
-    /// included, and how many frames outside of that range were left out.
+    /// Returns the frames `first..first + length` with evenly spaced stamps, including empty ones,
+    /// and the number of frames outside of that range, which are left out.
     pub fn into_sequence(
         mut self,
         name: &str,
@@ -144,23 +146,23 @@ impl Timeline {
     }
 }
 
-/// Last frame that is plausible in any file; nine hours at 30 frames a second.
+/// Last plausible frame number of any file; nine hours at 30 frames a second.
 pub const MOST_FRAMES: u32 = 1_000_000;
 
-/// Frames for each row of a file that are plausible beyond [`MOST_FRAMES`]: a day with few people in
-/// it. Scores need memory for every frame, also for those without a row, and a stamp in place of a
-/// number must not ask for gigabytes.
+/// Plausible number of frames per row of a file beyond [`MOST_FRAMES`], as in a day with few
+/// people. Scoring needs memory for every frame, even for those without a row, and a stamp in place
+/// of a frame number must not allocate gigabytes.
 const FRAMES_OF_A_ROW: usize = 10;
 
-/// Largest number of a person or a track: all whole numbers up to it are told apart as `f64`.
+/// Largest ID of a person or a track: as `f64`, all integers up to it are distinct.
 pub const MOST_ID: i64 = 8_999_999_999_999_999;
 
-/// One line cut into fields, with its place for error messages.
+/// One line split into fields, with its position for error messages.
 struct Line<'a> {
     file: &'a str,
     number: usize,
     fields: Vec<&'a str>,
-    /// Last frame that is plausible in a file of this length.
+    /// Last plausible frame number in a file of this length.
     last_frame: u32,
 }
 
@@ -187,7 +189,7 @@ impl<'a> Line<'a> {
         }
     }
 
-    /// A whole number; some programs write it as `12.0`.
+    /// Returns an integer field; some programs write it as `12.0`.
     fn whole(&self, index: usize, name: &str) -> Result<i64, FormatError> {
         let value = self.number(index, name)?;
         if value.fract() == 0.0 && value.abs() <= MOST_ID as f64 {
@@ -209,8 +211,8 @@ impl<'a> Line<'a> {
     }
 }
 
-/// Returns the value of a few digits with a point among them, as `parse` does, which takes longer:
-/// both numbers are exact, so that their quotient is rounded once.
+/// Returns the value of a few digits with a decimal point, the same as from the slower `parse`:
+/// both integers are exact, so their quotient is rounded once.
 fn plain(text: &str) -> Option<f64> {
     const TENS: [f64; 8] = [1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7];
     let (digits, negative) = match text.as_bytes() {
@@ -233,13 +235,14 @@ fn plain(text: &str) -> Option<f64> {
     Some(if negative { -value } else { value })
 }
 
-/// The lines that are not empty, cut at commas if there are any, else at blanks.
+/// Returns the lines that are not empty, split at commas if there are any, otherwise at blanks.
 fn lines<'a>(text: &'a str, file: &'a str) -> impl Iterator<Item = Line<'a>> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let last_frame = last_plausible_frame(text);
     text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()).map(
         move |(index, line)| {
-            // Room for the fields of most formats, which are not known before the end of the line.
+            // Capacity for the fields of most formats, whose number is known only at the end of the
+            // line.
             let mut fields = Vec::with_capacity(10);
             if line.contains(',') {
                 fields.extend(line.split(',').map(str::trim))
@@ -251,14 +254,14 @@ fn lines<'a>(text: &'a str, file: &'a str) -> impl Iterator<Item = Line<'a>> {
     )
 }
 
-/// Returns the last frame that is plausible in a text of so many lines.
+/// Returns the last plausible frame number in a text with this number of lines.
 fn last_plausible_frame(text: &str) -> u32 {
     let rows = text.bytes().filter(|byte| *byte == b'\n').count() + 1;
     let by_rows = u32::try_from(rows.saturating_mul(FRAMES_OF_A_ROW)).unwrap_or(u32::MAX);
     by_rows.max(MOST_FRAMES)
 }
 
-/// A table with a header line: columns are found by name.
+/// A table with a header line, in which columns are found by name.
 struct Table<'a> {
     header: Line<'a>,
     rows: Vec<Line<'a>>,

@@ -1,6 +1,6 @@
-//! MOTChallenge text: one box a line,
-//! `frame, id, x, y, width, height, confidence, class, visibility` for truth
-//! and `..., score, -1, -1, -1` for tracks; frames are numbered from 1.
+//! MOTChallenge text: one box per line,
+//! `frame, id, x, y, width, height, confidence, class, visibility` for truth and
+//! `..., score, -1, -1, -1` for tracks; frames are numbered from 1.
 
 use std::io::{self, Write};
 
@@ -14,43 +14,43 @@ pub struct Row {
     pub line: usize,
     /// Number of the frame, from 1.
     pub frame: u32,
-    /// The person or track; -1 for plain detections.
+    /// ID of the person or track; -1 for plain detections.
     pub id: i64,
     /// The box in pixels of the image.
     pub region: Region,
-    /// Score of a report; in truth 0 marks a box that does not count.
+    /// Score of a report; for a truth, 0 marks a box that does not count.
     pub confidence: f64,
-    /// Value in the field of the class, if the line is long enough: from MOT16 on the class of a
-    /// truth (1 = pedestrian); in MOT15 -1, or a place in metres.
+    /// Value of the class field, if the line has one: from MOT16 on the class of a truth (1 =
+    /// pedestrian); in MOT15 -1, or a coordinate in metres.
     pub class: Option<f64>,
-    /// Visible fraction of a truth, if the line is long enough.
+    /// Visible fraction of a truth, if the line has this field.
     pub visibility: Option<f64>,
 }
 
-/// Rules by which a truth counts.
+/// Rules that decide which truths count.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[non_exhaustive]
 pub enum Rules {
-    /// MOT15: there are no classes, a zero confidence takes a truth out.
+    /// MOT15: there are no classes; a truth with zero confidence does not count.
     Mot15,
     /// MOT16 and MOT17: only pedestrians count; reports matched with a person on a vehicle, a
     /// static person, a distractor or a reflection are left out.
     #[default]
     Mot17,
-    /// MOT20: as MOT17, and vehicles that are not motorised excuse as well.
+    /// MOT20: as MOT17, and vehicles without a motor excuse reports as well.
     Mot20,
 }
 
-/// Lines of MOT15 end with a place in metres, or -1 three times.
+/// Lines of MOT15 end with a position in metres, or with three times -1.
 const MOT15_FIELDS: usize = 10;
 
 impl Rules {
-    /// Returns the rules that truth is written for: those of MOT17 where every line has a
-    /// class of it, those of MOT15 where none has, or where lines end with places.
+    /// Returns the rules for which a truth file is written: those of MOT17 if every line has a
+    /// class of it, those of MOT15 if none has, or if lines end with positions.
     ///
     /// # Errors
     ///
-    /// As [`parse`]; lines with and without a class in one file: the first without.
+    /// As [`parse`]; in a file that has lines with and without a class, the first one without.
     pub fn of_truth(text: &str, file: &str) -> Result<Self, FormatError> {
         let rows = parse(text, file)?;
         let has_places = lines(text, file).all(|line| line.fields.len() >= MOT15_FIELDS)
@@ -70,7 +70,7 @@ impl Rules {
         }
     }
 
-    /// Returns the benchmark that the rules are named after.
+    /// Returns the name of the benchmark of these rules.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Mot15 => "MOT15",
@@ -90,7 +90,7 @@ const LAST_CLASS: i64 = 13;
 impl Row {
     /// Returns the role of the row as truth.
     pub fn role(&self, rules: Rules) -> Role {
-        // The confidence of truth is a flag, read as a whole number.
+        // The confidence of a truth is a flag, read as an integer.
         let counts = self.confidence.trunc() != 0.0;
         let class = self.known_class().unwrap_or(PEDESTRIAN);
         let excuses = DISTRACTORS.contains(&class)
@@ -104,13 +104,13 @@ impl Row {
         }
     }
 
-    /// The row as truth, with the number of its frame.
+    /// Returns the row as truth, with the number of its frame.
     pub fn truth(&self, rules: Rules) -> (u32, Truth) {
         let region = Some(self.region);
         (self.frame, Truth { id: self.id, region, role: self.role(rules), ..Truth::default() })
     }
 
-    /// The row as a report, with the number of its frame.
+    /// Returns the row as a report, with the number of its frame.
     pub fn report(&self) -> (u32, Report) {
         let region = Some(self.region);
         (self.frame, Report { id: self.id, region, floor_m: None, score: self.confidence })
@@ -133,12 +133,12 @@ impl Row {
     }
 }
 
-/// Reads truth, tracks or detections; `file` names the text in errors. Boxes without an area stay,
-/// as in TrackEval: they match no box.
+/// Reads truth, tracks or detections; `file` names the text in errors. Boxes without an area are
+/// kept, as in TrackEval; they match no other box.
 ///
 /// # Errors
 ///
-/// A line with fewer than six fields, something that is no number, a frame below 1.
+/// When a line has fewer than six fields, a field is not a number, or a frame is below 1.
 pub fn parse(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
     if let Some(first) = lines(text, file).next().filter(is_header) {
         return Err(
@@ -148,7 +148,7 @@ pub fn parse(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
     lines(text, file).map(|line| row(&line)).collect()
 }
 
-/// Returns true for names of columns: no field of boxes is a word.
+/// Returns true for a line of column names: no field of a box is a word.
 fn is_header(line: &Line<'_>) -> bool {
     line.fields.len() > 1
         && line.fields.iter().take(6).all(|field| {
@@ -156,11 +156,11 @@ fn is_header(line: &Line<'_>) -> bool {
         })
 }
 
-/// Reads truth; as [`parse`], but refuses the rows that TrackEval refuses.
+/// Reads truth as [`parse`] does, but rejects the rows that TrackEval rejects.
 ///
 /// # Errors
 ///
-/// As [`parse`]; an id below 0; no class, or one outside 1 to 13, under rules with classes.
+/// As [`parse`]; an ID below 0; no class, or one outside 1 to 13, under rules with classes.
 pub fn parse_truth(text: &str, file: &str, rules: Rules) -> Result<Vec<Row>, FormatError> {
     let rows = parse(text, file)?;
     for row in &rows {
@@ -172,11 +172,11 @@ pub fn parse_truth(text: &str, file: &str, rules: Rules) -> Result<Vec<Row>, For
     Ok(rows)
 }
 
-/// Reads tracks; as [`parse`], but refuses the rows that TrackEval refuses.
+/// Reads tracks as [`parse`] does, but rejects the rows that TrackEval rejects.
 ///
 /// # Errors
 ///
-/// As [`parse`]; an id below 0, a class other than that of people.
+/// As [`parse`]; an ID below 0, a class other than that of people.
 pub fn parse_tracks(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
     let rows = parse(text, file)?;
     for row in &rows {
@@ -189,7 +189,7 @@ pub fn parse_tracks(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
     Ok(rows)
 }
 
-/// Refuses frames beyond the end of a sequence.
+/// Rejects frames beyond the end of a sequence.
 ///
 /// # Errors
 ///
@@ -199,7 +199,7 @@ pub fn check_length(rows: &[Row], file: &str, length: u32) -> Result<(), FormatE
 }
 
 impl Row {
-    /// Refuses rows without an id: one id for all of them would be one person in many places.
+    /// Rejects rows without an ID: a single ID for all of them would be one person in many places.
     fn check_id(&self, file: &str) -> Result<(), FormatError> {
         if self.id >= 0 {
             return Ok(());
@@ -228,7 +228,7 @@ fn row(line: &Line<'_>) -> Result<Row, FormatError> {
     })
 }
 
-/// Writes a truth line: nine fields.
+/// Writes a truth line with nine fields.
 ///
 /// # Errors
 ///
@@ -244,7 +244,7 @@ pub fn write_truth(out: &mut impl Write, frame: u32, truth: &Truth) -> io::Resul
     writeln!(out, ",{counts},{class},1")
 }
 
-/// Writes a track line: ten fields.
+/// Writes a track line with ten fields.
 ///
 /// # Errors
 ///
@@ -279,8 +279,8 @@ pub struct SequenceInfo {
 ///
 /// # Errors
 ///
-/// A name, rate or length that is missing or no number, or a length beyond a
-/// million frames.
+/// When the name, rate or length is missing or not a number, or the length is beyond a million
+/// frames.
 pub fn parse_info(text: &str, file: &str) -> Result<SequenceInfo, FormatError> {
     info_of(text).map_err(|why| FormatError { file: file.to_owned(), line: 0, why })
 }

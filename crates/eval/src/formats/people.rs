@@ -1,6 +1,6 @@
 //! `people.csv`: upper bodies and heads annotated in a recording. The first line names the columns,
-//! which may stand in any order; frames are numbered from 1. `frame`, `id` and either a box of the
-//! upper body or the place of the head are required, all else has a default.
+//! in any order; frames are numbered from 1. `frame`, `id` and either a box of the upper body or
+//! the position of the head are required; everything else has a default.
 
 use std::io::{self, Write};
 
@@ -20,7 +20,7 @@ const HEAD: [&str; 3] = ["head_x", "head_y", "head_z"];
 pub struct Row {
     /// Number of the colour image, from 1.
     pub frame: u32,
-    /// Id of the person.
+    /// ID of the person.
     pub id: i64,
     /// The upper-body square in pixels, clipped to the image.
     pub upper_body: Option<Region>,
@@ -31,22 +31,23 @@ pub struct Row {
     pub head_in_camera_m: Option<[f64; 3]>,
     /// Visible fraction of the upper body; 1 by default.
     pub visible: f64,
-    /// Occluder: `0` nothing, a person's id, `border` or `static`.
+    /// Occluder: `0` for none, the ID of a person, `border` or `static`.
     pub occluder: String,
     /// Neither a miss nor a false alarm.
     pub ignore: bool,
-    /// 0 measured, 1 interpolated or set by eye, 2 depth from the torso.
+    /// 0 measured, 1 interpolated or set by eye, 2 depth taken from the torso.
     pub interpolated: u8,
-    /// True if the box was set by hand, false if it lies between boxes that were; true by default.
+    /// True if the box was set by hand, false if it is interpolated between boxes that were; true
+    /// by default.
     pub key: bool,
-    /// Pipeline that proposed the box, if it is not reviewed; empty by default.
+    /// Pipeline that proposed the box, if it is not reviewed yet; empty by default.
     pub proposed: String,
 }
 
 impl Row {
-    /// The row as truth, with the number of its frame. `floor_from_camera`
-    /// takes the head's place in the camera to the floor frame that the tracks
-    /// use, in metres; it gives nothing where that is not known.
+    /// Returns the row as truth, with the number of its frame. `floor_from_camera` converts the
+    /// position of the head in the camera frame to the floor frame of the tracks, in metres; it
+    /// returns `None` if that is not known.
     pub fn truth(&self, floor_from_camera: impl Fn([f64; 3]) -> Option<[f64; 2]>) -> (u32, Truth) {
         let truth = Truth {
             id: self.id,
@@ -64,20 +65,20 @@ impl Row {
     }
 }
 
-/// Reads `people.csv`; columns are found by name, unknown ones are passed over. Cells that are not
+/// Reads `people.csv`. Columns are found by name; unknown ones are ignored. Cells that are not
 /// required may be empty, and their columns missing.
 ///
 /// # Errors
 ///
-/// A missing column, a row with neither box nor place, something that is no number, a negative
-/// size.
+/// When a column is missing, a row has neither box nor position, a field is not a number, or a size
+/// is negative.
 pub fn parse(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
     let table = Table::new(text, file)?;
     for required in ["frame", "id"] {
         table.column(required)?;
     }
     for group in [&UPPER_BODY[..], &VISIBLE_BODY, &HEAD] {
-        // A part of a group is a misspelt column.
+        // If only some columns of a group are there, one is misspelt.
         if group.iter().any(|name| table.find(name).is_some()) {
             group.iter().try_for_each(|name| table.column(name).map(|_| ()))?;
         }
@@ -89,7 +90,7 @@ pub fn parse(text: &str, file: &str) -> Result<Vec<Row>, FormatError> {
     table.rows.iter().map(|line| Cells { line, table: &table }.row()).collect()
 }
 
-/// A line with the columns of its table.
+/// A line together with the columns of its table.
 struct Cells<'a> {
     line: &'a Line<'a>,
     table: &'a Table<'a>,
@@ -106,7 +107,7 @@ impl Cells<'_> {
         self.filled(name)?.map_or(Ok(default), |at| self.line.number(at, name))
     }
 
-    /// Returns the numbers of some columns, of which all or none are filled.
+    /// Returns the numbers in a group of columns, which must all be filled or all be empty.
     fn group<const N: usize>(&self, names: [&str; N]) -> Result<Option<[f64; N]>, FormatError> {
         let mut values = [0.0; N];
         let mut empty = 0;

@@ -1,4 +1,4 @@
-//! The folder tree that TrackEval reads, so that it can score a benchmark itself:
+//! The folder tree that TrackEval reads, so that TrackEval can score a benchmark:
 //!
 //! ```text
 //! gt/mot_challenge/seqmaps/NAME-train.txt
@@ -7,11 +7,10 @@
 //! trackers/mot_challenge/NAME-train/TRACKER/data/SEQUENCE.txt
 //! ```
 //!
-//! To score it, from TrackEval's folder: `python scripts/run_mot_challenge.py
-//! --BENCHMARK NAME --GT_FOLDER gt/mot_challenge --TRACKERS_FOLDER
-//! trackers/mot_challenge`. Ignored people are exported as distractors, so
-//! TrackEval leaves out the same reports as [`crate::Prepared`] does; it knows
-//! no ignore regions, and they are not exported.
+//! To score it, run in the folder of TrackEval: `python scripts/run_mot_challenge.py --BENCHMARK
+//! NAME --GT_FOLDER gt/mot_challenge --TRACKERS_FOLDER trackers/mot_challenge`. Ignored people are
+//! exported as distractors, so that TrackEval leaves out the same reports as [`crate::Prepared`]
+//! does. Ignore regions are not exported, because TrackEval has none.
 
 use std::collections::BTreeMap;
 
@@ -19,10 +18,10 @@ use super::mot::{self, SequenceInfo};
 use super::{FormatError, Timeline};
 use crate::types::Sequence;
 
-/// The files of a tree: path with `/` between folders, and content.
+/// The files of a tree: paths with `/` between folders, and their content.
 pub type Files = BTreeMap<String, String>;
 
-/// The sequences of a benchmark and its tracker, in the image only.
+/// Returns the sequences of a benchmark and the results of a tracker, in the image only.
 ///
 /// `benchmark` is one word such as `Tagalong`; TrackEval applies the MOT17 rules
 /// to any name but MOT15 and MOT20. People and reports without an image region
@@ -46,12 +45,12 @@ pub fn write(benchmark: &str, tracker: &str, sequences: &[(SequenceInfo, Sequenc
     files
 }
 
-/// Reads one tracker's results out of such a tree; `rules` decide which truths count.
+/// Reads one tracker's results from such a tree; `rules` decide which truths count.
 ///
 /// # Errors
 ///
-/// A missing file, a line that cannot be read, or a frame beyond the length that `seqinfo.ini`
-/// states.
+/// When a file is missing, a line cannot be read, or a frame is beyond the length that
+/// `seqinfo.ini` states.
 pub fn read(
     files: &Files,
     benchmark: &str,
@@ -117,7 +116,7 @@ fn report_text(sequence: &Sequence) -> String {
     })
 }
 
-/// Returns the text of a writer; writing to memory cannot fail.
+/// Returns the text that a writer produces; writing to memory cannot fail.
 fn text(write: impl FnOnce(&mut Vec<u8>) -> std::io::Result<()>) -> String {
     let mut bytes = Vec::new();
     let written = write(&mut bytes);

@@ -1,8 +1,8 @@
 //! Reader of the records of a ROS 1 bag. See [`crate::LogWalker`] for the rules.
 //!
 //! A bag has no checksums, so damage within a message may go unnoticed until the message is
-//! decoded. The payload of a message stands behind four bytes that say that it is serialised as
-//! ROS 1 does ([`crate::msgs::decode`] reads them as it reads the encapsulation header of CDR).
+//! decoded. The payload of a message is preceded by four bytes that mark it as serialised by ROS 1
+//! ([`crate::msgs::decode`] reads them like the encapsulation header of CDR).
 //!
 //! Source: the bag format, version 2.0 (wiki.ros.org/Bags/Format/2.0).
 
@@ -20,13 +20,13 @@ use crate::walk::{Channel, Located, Walk};
 /// First bytes of a bag.
 pub(crate) const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
 
-/// Name of the serialisation of the messages.
+/// Name of the serialisation format of the messages.
 pub(crate) const ENCODING: &str = "ros1";
 
-/// Memory of the reader of a bag.
+/// State of the reader of a bag.
 #[derive(Default)]
 pub(crate) struct Bag {
-    /// Packed chunk, kept for its memory.
+    /// Compressed chunk; the buffer is reused.
     packed: Vec<u8>,
 }
 
@@ -41,7 +41,7 @@ impl Bag {
     pub(crate) fn step_in_file<R: Read>(&mut self, walk: &mut Walk<R>) {
         walk.offset = walk.source.position();
         let Some(header_length) = length(walk) else { return };
-        // Without a header there is no way to find the next record.
+        // Without a header the next record cannot be found.
         if header_length > walk.limits.schema_bytes {
             walk.fault("damaged_records", || format!("a header claims {header_length} bytes"));
             walk.ended = true;
@@ -68,7 +68,7 @@ impl Bag {
         }
     }
 
-    /// Reads the data of a record that stands outside of chunks, behind its header.
+    /// Reads the data of a record outside of chunks, which follows its header.
     fn take_record<R: Read>(&mut self, walk: &mut Walk<R>, length: u64) {
         if length > walk.limits.record_bytes {
             walk.fault("oversized_records", || format!("a record claims {length} bytes"));
@@ -105,14 +105,14 @@ impl Bag {
                 walk.count("chunks_without_crc");
                 walk.rest = 0..walk.buffer.len();
             }
-            Ok(()) => walk.fault("damaged_chunks", || "a chunk has not the size it claims".into()),
+            Ok(()) => walk.fault("damaged_chunks", || "a chunk is not of the claimed size".into()),
             Err(Unpack::Unknown) => {
                 walk.fault("unknown_compression_chunks", || {
                     format!("compression `{compression}`; known: none, bz2, lz4")
                 });
             }
             Err(Unpack::Damaged(why)) => {
-                walk.fault("damaged_chunks", || format!("a chunk does not unpack: {why}"));
+                walk.fault("damaged_chunks", || format!("a chunk cannot be unpacked: {why}"));
             }
         }
     }
@@ -152,14 +152,15 @@ pub(crate) fn step_in_buffer<R: Read>(walk: &mut Walk<R>) {
     }
 }
 
-/// Returns the parts of the record at the start of the rest; `None` if it is longer than that.
+/// Returns the parts of the record at the start of the rest; `None` if the record is longer than
+/// that.
 fn parts<R>(walk: &Walk<R>) -> Option<Parts> {
     let header = counted(&walk.buffer, walk.rest.start)?;
     let data = counted(&walk.buffer, header.end)?;
     (data.end <= walk.rest.end).then_some(Parts { header, data })
 }
 
-/// Returns the range of the bytes behind the length at `at`, which says how many they are.
+/// Returns the range of the bytes behind the length field at `at`, which gives their number.
 fn counted(buffer: &[u8], at: usize) -> Option<Range<usize>> {
     let start = at.checked_add(4)?;
     let length = u32_at(buffer.get(at..start)?, 0) as usize;
@@ -186,7 +187,7 @@ fn locate<R: Read>(walk: &mut Walk<R>, parts: &Parts) -> Option<()> {
     let id = fields.number("conn")?;
     let time_ns = fields.time_ns("time")?;
     let Some(channel) = walk.channel_of(id) else { return Some(()) };
-    // The mark takes the place of the length of the data, which was read.
+    // The mark replaces the length of the data, which has been read already.
     let data = parts.data.start - ROS1_MARK.len()..parts.data.end;
     walk.buffer[data.start..parts.data.start].copy_from_slice(&ROS1_MARK);
     let log_time = time_ns;
@@ -195,7 +196,7 @@ fn locate<R: Read>(walk: &mut Walk<R>, parts: &Parts) -> Option<()> {
     Some(())
 }
 
-/// Reason for which a chunk does not unpack.
+/// Reason why a chunk cannot be unpacked.
 enum Unpack {
     Unknown,
     Damaged(String),

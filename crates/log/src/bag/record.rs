@@ -1,10 +1,10 @@
-//! Record headers of a ROS 1 bag: fields `name=value`, each with its length in front.
+//! Record headers of a ROS 1 bag: fields `name=value`, each preceded by its length.
 
 use std::collections::BTreeMap;
 
 use crate::mcap::record::{u32_at, u64_at};
 
-/// Kind of a record, the field `op` of its header.
+/// Kind of a record: the field `op` of its header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Op {
     Message,
@@ -37,18 +37,18 @@ impl<'a> Fields<'a> {
         self.0.get(name.as_bytes()).copied()
     }
 
-    /// Returns a field of text.
+    /// Returns a text field.
     pub(super) fn text(&self, name: &str) -> Option<&'a str> {
         std::str::from_utf8(self.bytes(name)?).ok()
     }
 
-    /// Returns a field of four bytes.
+    /// Returns a field of four bytes as a number.
     pub(super) fn number(&self, name: &str) -> Option<u32> {
         let bytes = self.bytes(name)?;
         (bytes.len() == 4).then(|| u32_at(bytes, 0))
     }
 
-    /// Returns a time, ns.
+    /// Returns a time field, ns.
     pub(super) fn time_ns(&self, name: &str) -> Option<u64> {
         let bytes = self.bytes(name)?;
         let both = (bytes.len() == 8).then(|| u64_at(bytes, 0))?;

@@ -1,9 +1,9 @@
-//! Databases whose recorder has not finished: with a rollback journal or a write-ahead log beside
+//! Databases whose recorder has not finished, with a rollback journal or a write-ahead log beside
 //! them.
 //!
-//! SQLite changes such a database when it is read: it rolls the journal back, or makes a file
-//! `-shm` beside a write-ahead log. A log of a user is never changed, so both are read from a copy,
-//! and a database with an empty write-ahead log is opened as one that does not change.
+//! SQLite changes such a database when it is read: it rolls the journal back, or creates a file
+//! `-shm` beside a write-ahead log. The log of a user is never changed, so in both cases a copy is
+//! read, and a database with an empty write-ahead log is opened as immutable.
 //!
 //! Source: <https://www.sqlite.org/fileformat2.html>, sections 1.3.3, 3 and 4.
 
@@ -20,13 +20,13 @@ use super::no_database;
 use crate::Limits;
 use crate::error::NotMcap;
 
-/// Start of the header of a rollback journal, and end of one that belongs to several databases.
+/// Start of the header of a rollback journal, and end of one that covers several databases.
 const JOURNAL_MAGIC: [u8; 8] = [0xd9, 0xd5, 0x05, 0xf9, 0x20, 0xa1, 0x63, 0xd7];
 /// Length of the header of a write-ahead log, bytes, ...
 const WAL_HEADER: usize = 32;
-/// ... and of that of each of its pages.
+/// ... and of the header of each of its pages.
 const WAL_PAGE_HEADER: usize = 24;
-/// Name of a database within its copy.
+/// Name of a database in the folder of its copy.
 const COPY: &str = "log.db3";
 
 /// Database that is open for reading.
@@ -36,9 +36,9 @@ pub(super) struct Opened {
     pub(super) path: PathBuf,
     /// Description of what was left out because it was not committed.
     pub(super) left_out: Option<String>,
-    /// True if the header of the file tells its size.
+    /// True if the file header states its size.
     pub(super) tells_size: bool,
-    /// Copy, which is deleted in the end.
+    /// Copy, which is deleted when it is dropped.
     _copy: Option<TempDir>,
 }
 
@@ -46,20 +46,20 @@ pub(super) struct Opened {
 enum State {
     /// Finished.
     Closed,
-    /// Finished, and its mode is that of a write-ahead log.
+    /// Finished, in the mode of a write-ahead log.
     ClosedWal,
-    /// A transaction was under way; the journal has the pages as they were before.
+    /// A transaction was in progress; the journal has the pages as they were before.
     Journal,
     /// Transactions are in the write-ahead log.
     Wal,
 }
 
-/// Opens a database without a change of anything beside it.
+/// Opens a database without changing anything beside it.
 ///
 /// # Errors
 /// A sentence with the remedy.
 pub(super) fn open(path: &Path, limits: &Limits) -> Result<Opened, NotMcap> {
-    // SQLite looks for the other files beside the file that a link names.
+    // SQLite looks for the other files beside the target of a link.
     let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let read_only = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     match state_of(&path) {
@@ -119,7 +119,7 @@ fn state_of(path: &Path) -> State {
     if length > WAL_HEADER as u64 { State::Wal } else { State::ClosedWal }
 }
 
-/// Returns the first bytes of a regular file that has as many.
+/// Returns the first bytes of a regular file, if it is long enough.
 fn start_of<const N: usize>(path: &Path) -> Option<[u8; N]> {
     if !std::fs::metadata(path).ok()?.is_file() {
         return None;
@@ -129,8 +129,8 @@ fn start_of<const N: usize>(path: &Path) -> Option<[u8; N]> {
     Some(start)
 }
 
-/// Returns the address of a database that nobody changes, so that SQLite neither locks it nor makes
-/// files beside it.
+/// Returns the URI of an immutable database, so that SQLite neither locks it nor creates files
+/// beside it.
 fn unchanging(path: &Path) -> String {
     let mut address = String::from("file:");
     for byte in path.as_os_str().as_encoded_bytes() {
@@ -138,7 +138,7 @@ fn unchanging(path: &Path) -> String {
             b'/' | b'.' | b'-' | b'_' | b'0'..=b'9' | b'a'..=b'z' | b'A'..=b'Z' => {
                 address.push(char::from(*byte));
             }
-            // Writing to a text cannot fail.
+            // Writing to a string cannot fail.
             _ => _ = write!(address, "%{byte:02x}"),
         }
     }
@@ -171,7 +171,7 @@ fn open_copy(
             "a rosbag2 database that its recorder did not finish, nor can SQLite: {why}"
         ))
     })?;
-    // The header is that of before the transactions in a write-ahead log.
+    // The header may be from before the transactions in a write-ahead log.
     let tells_size = ending != "-wal";
     Ok(Opened { connection, path: copy, left_out, tells_size, _copy: Some(folder) })
 }
@@ -185,15 +185,16 @@ fn no_room(why: &io::Error) -> NotMcap {
     ))
 }
 
-/// Copies the contents of a file, and not its permissions: the copy is written to.
+/// Copies the contents of a file but not its permissions, because the copy is written to.
 fn copy_file(from: &Path, to: &Path) -> io::Result<()> {
     io::copy(&mut File::open(from)?, &mut File::create(to)?).map(drop)
 }
 
-/// Returns the number of pages that a journal has as they were.
+/// Returns the number of pages whose previous contents are in a journal.
 ///
 /// # Errors
-/// A journal of a transaction over several databases. It names a file that SQLite would delete.
+/// A journal of a transaction over several databases, because it names a file that SQLite would
+/// delete.
 fn pages_of_journal(journal: &Path) -> Result<u64, String> {
     let (header, length, end) = ends_of_journal(journal).map_err(|error| error.to_string())?;
     if end == JOURNAL_MAGIC {
@@ -203,7 +204,7 @@ fn pages_of_journal(journal: &Path) -> Result<u64, String> {
     }
     let sector = u64::from(u32_at(&header, 20));
     let page = u64::from(u32_at(&header, 24));
-    // A number of each page, and a checksum.
+    // Each page comes with its number and a checksum.
     Ok(length.saturating_sub(sector) / (page + 8))
 }
 
@@ -223,7 +224,7 @@ fn file_size(file: &Path) -> u64 {
     std::fs::metadata(file).map_or(0, |about| about.len())
 }
 
-/// Returns the number of pages behind the last commit of a write-ahead log.
+/// Returns the number of pages behind the last commit in a write-ahead log.
 fn uncommitted_pages(wal: &Path) -> io::Result<u64> {
     let length = std::fs::metadata(wal)?.len();
     let mut file = io::BufReader::new(File::open(wal)?);
@@ -234,7 +235,7 @@ fn uncommitted_pages(wal: &Path) -> io::Result<u64> {
     let mut position = WAL_HEADER as u64;
     let mut frame = [0; WAL_PAGE_HEADER];
     while file.read_exact(&mut frame).is_ok() {
-        // Pages of an earlier use of the file have other salts.
+        // Pages from an earlier use of the file have different salts.
         if frame[8..16] != header[16..24] {
             break;
         }

@@ -1,4 +1,4 @@
-//! Colour filter arrays: bilinear interpolation, as OpenCV's `cvtColor`.
+//! Colour filter arrays (Bayer patterns): bilinear interpolation, as in OpenCV's `cvtColor`.
 
 use tagalong_core::RgbImage;
 
@@ -25,13 +25,13 @@ impl Pattern {
         }))
     }
 
-    /// Returns the colours of the first two pixels of a row and of the next one.
+    /// Returns the colours of the first two pixels of a row and of the next row.
     fn rows(self, y: usize) -> [[usize; 2]; 2] {
         [self.0[y % 2], self.0[(y + 1) % 2]]
     }
 }
 
-/// Interpolates the colours. The outermost pixels are those next to them.
+/// Interpolates the colours. The outermost pixels repeat those next to them.
 pub(super) fn interpolate(rows: &Rows<'_>, pattern: Pattern) -> RgbImage {
     let width = rows.width;
     let height = rows.height;
@@ -46,7 +46,7 @@ pub(super) fn interpolate(rows: &Rows<'_>, pattern: Pattern) -> RgbImage {
     exact(width, height, pixels)
 }
 
-/// Returns the colours of a pixel of the middle one of three rows from itself and its neighbours.
+/// Returns the colours of a pixel in the middle one of three rows from itself and its neighbours.
 /// `pattern` has the colours of the middle row and of the lower one.
 fn colours_at([upper, middle, lower]: [&[u8]; 3], pattern: [[usize; 2]; 2], x: usize) -> [u8; 3] {
     // The same holds for an image of one or two columns.

@@ -1,5 +1,5 @@
-//! `sensor_msgs/PointCloud2`: depth of a camera that publishes a point for each pixel, in rows and
-//! columns, and the points of a lidar.
+//! `sensor_msgs/PointCloud2`: depth from a camera that publishes an organised cloud, with a point
+//! for each pixel, and the points of a lidar.
 
 use nalgebra::Point3;
 use tagalong_core::DepthImage;
@@ -10,26 +10,26 @@ use super::{ImageError, check_size};
 use crate::Limits;
 use crate::msgs::{PointCloud2, PointField};
 
-/// Least number of points by which the lens is measured.
+/// Minimum number of points for estimating the lens.
 const MIN_POINTS: usize = 100;
-/// Largest mean error of the lens, pixels, up to which rows and columns are those of a camera.
+/// Maximum mean error of the lens, pixels, up to which rows and columns are those of a camera.
 const MAX_ERROR_PX: f64 = 1.0;
-/// Least share of the points that are in front of the camera.
+/// Minimum fraction of the points that are in front of the camera.
 const IN_FRONT: f64 = 0.99;
-/// Number of pixels along the longer side by which the lens is measured, about.
+/// Approximate number of pixels along the longer side that are used for estimating the lens.
 const SAMPLES_A_SIDE: usize = 160;
 
 /// Axes of the points of a cloud.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum CloudAxes {
-    /// Z ahead, X to the right, Y down: an optical frame.
+    /// Z forward, X right, Y down: an optical frame.
     Optical,
-    /// X ahead, Y to the left, Z up: a frame of the robot's body.
+    /// X forward, Y left, Z up: a frame of the robot's body.
     Body,
 }
 
-/// Camera of a cloud whose points lie in rows and columns, measured by the points.
+/// Camera of an organised point cloud, estimated from the points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct CloudCamera {
@@ -40,7 +40,7 @@ pub struct CloudCamera {
 }
 
 impl CloudAxes {
-    /// Returns a point as to the right, down and ahead.
+    /// Returns a point as right, down and forward.
     fn optical(self, [x, y, z]: [f32; 3]) -> [f64; 3] {
         match self {
             Self::Optical => [x.into(), y.into(), z.into()],
@@ -52,7 +52,7 @@ impl CloudAxes {
 /// Returns columns and rows of a cloud.
 ///
 /// # Errors
-/// [`ImageError`]: points without an order, a size beyond the limits, fields or data that contradict
+/// [`ImageError`]: an unorganised cloud, a size beyond the limits, fields or data that contradict
 /// the size.
 pub fn size_of_cloud(
     cloud: &PointCloud2<'_>,
@@ -61,8 +61,8 @@ pub fn size_of_cloud(
     Points::new(cloud, limits).map(|points| (points.width, points.height))
 }
 
-/// Decodes the points of a camera to depth along its optical axis; a point that is not finite, or not
-/// in front of the camera, is no reading.
+/// Decodes the points of a camera into depth along its optical axis. A point that is not finite, or
+/// not in front of the camera, gives no reading.
 ///
 /// # Errors
 /// As [`size_of_cloud`].
@@ -83,12 +83,12 @@ pub fn decode_cloud(
     Ok(exact(points.width, points.height, depth))
 }
 
-/// Measures axes and lens of the camera of a cloud. `None` where too few points are valid, as in a
+/// Estimates axes and lens of the camera of a cloud. `None` if too few points are valid, as in a
 /// first image that is still dark.
 ///
 /// # Errors
 /// As [`size_of_cloud`], and points whose rows and columns are not those of a camera without
-/// distortion, as of a lidar.
+/// distortion, for example those of a lidar.
 pub fn camera_of_cloud(
     cloud: &PointCloud2<'_>,
     limits: &Limits,
@@ -114,12 +114,12 @@ pub fn camera_of_cloud(
         }
     }
     Err(ImageError::Cloud(
-        "its points are not those of the pixels of a camera, as those of a lidar".into(),
+        "its points do not belong to the pixels of a camera, like those of a lidar".into(),
     ))
 }
 
-/// Returns the points of a lidar, m, in its own frame. Beams without a reflection, which drivers write
-/// as not finite or as the place of the lidar itself, are left out.
+/// Returns the points of a lidar, m, in its own frame. Beams without a reflection, for which
+/// drivers write values that are not finite or the position of the lidar itself, are left out.
 ///
 /// # Errors
 /// [`ImageError`]: a size beyond the limits, fields or data that contradict the size.
@@ -140,7 +140,7 @@ pub fn points_of_cloud(
     Ok(found)
 }
 
-/// Pixel and point.
+/// Pixel and its point.
 type Sample = ([f64; 2], [f32; 3]);
 
 /// Returns the lens that maps points to their pixels; `None` if there is none for these axes.
@@ -164,7 +164,7 @@ fn fitted_lens(samples: &[Sample], axes: CloudAxes) -> Option<Pinhole> {
     (fx > 0.0 && fy > 0.0).then_some(Pinhole { fx, fy, cx, cy, distortion: Distortion::None })
 }
 
-/// Straight line through pairs of numbers, by least squares.
+/// Straight line through pairs of numbers, fitted by least squares.
 #[derive(Default)]
 struct Line {
     count: f64,
@@ -185,7 +185,7 @@ impl Line {
         self.yy += y * y;
     }
 
-    /// Returns the value at 0 and the slope; `None` for pairs that lie on no line.
+    /// Returns the value at 0 and the slope; `None` if the pairs do not determine a line.
     fn fit(&self) -> Option<[f64; 2]> {
         let mean_x = self.x / self.count;
         let mean_y = self.y / self.count;
@@ -223,7 +223,7 @@ impl<'a> Points<'a> {
         Self::unordered(cloud, limits)
     }
 
-    /// Checks the layout of points in any order.
+    /// Checks the layout of an organised or unorganised cloud.
     fn unordered(cloud: &'a PointCloud2<'_>, limits: &Limits) -> Result<Self, ImageError> {
         if cloud.data.len() as u64 > limits.image_bytes {
             let width = cloud.width.into();

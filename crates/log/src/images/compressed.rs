@@ -27,12 +27,12 @@ const PNG: &[u8] = &[0x89, b'P', b'N', b'G'];
 /// First bytes of a JPEG.
 const JPEG: &[u8] = &[0xff, 0xd8];
 
-/// Decodes a compressed image. Except for `compressedDepth`, the codec follows from the first
-/// bytes, not from the format string, which drivers fill in differently. Depth is scaled as in
+/// Decodes a compressed image. Except for `compressedDepth`, the codec is recognised by the first
+/// bytes, not by the format string, which differs between drivers. Depth is scaled as in
 /// [`super::decode_raw`].
 ///
 /// # Errors
-/// [`ImageError`]. A JPEG that ends early is an error, not half a picture.
+/// [`ImageError`]. A JPEG that ends early is an error and does not give half a picture.
 pub fn decode_compressed(
     image: &CompressedImage<'_>,
     depth_unit_m: Option<f64>,
@@ -67,7 +67,7 @@ pub(crate) enum Codec {
 }
 
 impl Codec {
-    /// Returns the codec of an image, also behind the header of `compressedDepth`.
+    /// Returns the codec of an image, after the header of `compressedDepth` if there is one.
     pub(crate) fn of(image: &CompressedImage<'_>) -> Self {
         let body = DepthPacket::of(image).map_or(image.data, |packet| packet.body);
         match body {
@@ -92,7 +92,7 @@ impl Codec {
 
 /// Returns true for a PNG with one channel of 16 bits.
 fn is_deep_png(data: &[u8]) -> bool {
-    // Bits and channels stand at a fixed place of the first chunk.
+    // Bits and channels are at a fixed position in the first chunk.
     data.starts_with(PNG) && data.get(24..26) == Some(&[16, 0])
 }
 
@@ -129,7 +129,7 @@ pub fn size_of_compressed(
             check_size(width.into(), height.into(), 4, limits)?;
             Ok((width as usize, height as usize))
         }
-        // RVL has its size in a header of its own, which decoding reads and checks.
+        // RVL has its size in a separate header, which the decoder reads and checks.
         _ => match packet {
             Some(packet) => {
                 let values = packet.decode(&image.format, None, limits)?;
@@ -144,10 +144,10 @@ fn codec(error: impl std::fmt::Debug) -> ImageError {
     ImageError::Codec(format!("{error:?}"))
 }
 
-/// Returns true if a JPEG has its end marker behind its last scan. The decoder would otherwise fill
-/// in the last few blocks of a picture that is slightly truncated.
+/// Returns true if a JPEG has its end marker after its last scan. Otherwise the decoder would fill
+/// in the last few blocks of a slightly truncated picture.
 fn has_jpeg_end(data: &[u8]) -> bool {
-    // 0xd9 ends the image and 0xda starts a scan: the last of both decides.
+    // 0xd9 ends the image and 0xda starts a scan; the last of either decides.
     let markers = data.windows(2).rev().filter(|pair| pair[0] == 0xff);
     markers.map(|pair| pair[1]).find(|code| matches!(code, 0xd9 | 0xda)) == Some(0xd9)
 }
@@ -157,7 +157,7 @@ fn jpeg(data: &[u8], limits: &Limits) -> Result<Pixels, ImageError> {
         return Err(ImageError::Codec("a JPEG without its end".into()));
     }
     let side = limits.image_side_px as usize;
-    // Strict, so that a damaged scan is an error and not half a picture.
+    // Strict mode, so that a damaged scan is an error and not half a picture.
     let options = DecoderOptions::default()
         .set_strict_mode(true)
         .set_max_width(side)
@@ -184,7 +184,7 @@ fn jpeg(data: &[u8], limits: &Limits) -> Result<Pixels, ImageError> {
 }
 
 fn png(data: &[u8], depth_unit_m: Option<f64>, limits: &Limits) -> Result<Pixels, ImageError> {
-    // As for `16UC1`: millimetres.
+    // Millimetres, as for `16UC1`.
     let unit = depth_unit_m.unwrap_or(0.001) as f32;
     if let Some(depth) = deep_png::decode(data, limits, |v| metres(v, unit)) {
         return Ok(Pixels::Depth(depth));
@@ -212,7 +212,7 @@ fn png(data: &[u8], depth_unit_m: Option<f64>, limits: &Limits) -> Result<Pixels
     Ok(pixels)
 }
 
-/// Decoded PNG, samples of 16 bits high byte first.
+/// Decoded PNG; samples of 16 bits have the high byte first.
 struct PngPixels {
     width: usize,
     height: usize,
@@ -245,7 +245,7 @@ impl PngPixels {
         })
     }
 
-    /// Returns what `pixel` makes of the values; `None` if they are not 16 bits of grey.
+    /// Converts the values with `pixel`; `None` if they are not 16-bit grey.
     fn scaled(&self, pixel: impl Fn(u16) -> f32) -> Option<DepthImage> {
         let is_deep =
             (self.colour, self.depth) == (png::ColorType::Grayscale, png::BitDepth::Sixteen);
@@ -254,7 +254,8 @@ impl PngPixels {
     }
 }
 
-/// Depth as `compressed_depth_image_transport` writes it: a header of 12 bytes, then 16-bit PNG or RVL.
+/// Depth as `compressed_depth_image_transport` writes it: a header of 12 bytes, then a 16-bit PNG
+/// or RVL.
 struct DepthPacket<'a> {
     /// Format, and the numbers a and b of the quantisation; some drivers leave the header out.
     header: Option<&'a [u8]>,
@@ -262,8 +263,8 @@ struct DepthPacket<'a> {
 }
 
 impl<'a> DepthPacket<'a> {
-    /// Returns the packet of an image whose format names it, or that has the header before a 16-bit PNG
-    /// under any other format; `None` for every other image.
+    /// Returns the packet of an image whose format names it, or of one that has the header before a
+    /// 16-bit PNG under any other format; `None` for every other image.
     fn of(image: &CompressedImage<'a>) -> Option<Self> {
         let data = image.data;
         let is_declared = image.format.to_ascii_lowercase().contains("compresseddepth");
@@ -279,8 +280,8 @@ impl<'a> DepthPacket<'a> {
         }
     }
 
-    /// Returns the numbers a and b of floats, which are quantised as inverse depth, `a / (v - b)`; `None`
-    /// for whole units.
+    /// Returns the numbers a and b of floating-point depth, which is quantised as inverse depth,
+    /// `a / (v - b)`; `None` for integer units.
     fn quantisation(&self, format: &str) -> Option<[f32; 2]> {
         let header = self.header?;
         let [a, b] = [4, 8].map(|at| f32::from_bits(u32_at(header, at)));
@@ -288,8 +289,8 @@ impl<'a> DepthPacket<'a> {
         let is_float = if format.contains("32FC1") {
             true
         } else {
-            // Without the encoding the numbers tell, which are not set before whole units: a is some
-            // ten thousand, and b is 1 - a by the largest depth.
+            // Without the encoding the two numbers decide, because they are not set before integer
+            // units: a is some ten thousand, and b is 1 minus a divided by the largest depth.
             !format.contains("16UC1") && (1.0..1e8).contains(&a) && (-1e8..1.0).contains(&b)
         };
         is_float.then_some([a, b])
@@ -314,7 +315,7 @@ impl<'a> DepthPacket<'a> {
     }
 }
 
-/// Returns what `pixel` makes of the values in the body of a `compressedDepth` message.
+/// Converts the values in the body of a `compressedDepth` message with `pixel`.
 fn depth_of(
     body: &[u8],
     is_rvl: bool,
@@ -348,7 +349,7 @@ fn depth_of(
 }
 
 /// Returns the data of a `16UC1; compressedDepth rvl` message: header, size, stream. `values` are
-/// `width * height` readings in millimetres, 0 = none.
+/// `width * height` readings in millimetres, 0 means none.
 pub fn encode_rvl(width: u32, height: u32, values: &[u16]) -> Vec<u8> {
     let mut out = vec![0; DEPTH_HEADER];
     out.extend_from_slice(&width.to_le_bytes());

@@ -1,9 +1,9 @@
-//! Depth from PNGs of 16 bits of grey, straight to metres.
+//! Depth from PNGs of 16-bit grey, converted directly to metres.
 //!
-//! Encoders that look for the smallest file filter most rows of depth by Paeth's predictor, which
-//! waits for the pixel to the left, and that for the one before it. Rows need not wait for each
-//! other's ends: eight of them are undone at once, each a pixel behind the one above, so that the
-//! neighbours of all eight are there at each step.
+//! Encoders that minimise the file size filter most rows of depth with Paeth's predictor, in which
+//! each pixel depends on the one to its left. Rows need not wait for the end of the previous one:
+//! eight of them are decoded at once, each a pixel behind the one above, so that the neighbours of
+//! all eight are available at each step.
 //!
 //! Portable Network Graphics (PNG) Specification, third edition, section 9.
 
@@ -14,18 +14,19 @@ use super::raw::exact;
 use crate::Limits;
 
 const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
-/// Rest of the header behind the size: 16 bits of grey, not interlaced.
+/// Rest of the header after the size: 16-bit grey, not interlaced.
 const DEEP_GREY: [u8; 5] = [16, 0, 0, 0, 0];
-/// Distance up to which deflate repeats bytes.
+/// Maximum distance at which deflate repeats bytes.
 const HISTORY: usize = 32 * 1024;
-/// Rows that are undone at once, and their bytes at one step.
+/// Number of rows that are decoded at once, and of their bytes in one step.
 const ROWS: usize = 8;
 const LANES: usize = 2 * ROWS;
-/// Last filter that can be undone row by row without waiting long: none, left, up, mean, Paeth.
+/// Last filter that can be undone row by row without long dependencies; the order is none, left,
+/// up, mean, Paeth.
 const LAST_SIMPLE: u8 = 2;
 
-/// Returns what `pixel` makes of each value of a PNG of 16 bits of grey. `None` for any other file
-/// and for a damaged one, for a complete decoder to read or to refuse.
+/// Converts each value of a PNG of 16-bit grey with `pixel`. `None` for any other file and for a
+/// damaged one, which a complete decoder has to read or to reject.
 pub(super) fn decode(
     data: &[u8],
     limits: &Limits,
@@ -48,7 +49,7 @@ pub(super) fn decode(
     is_whole.then(|| exact(width, height, out))
 }
 
-/// Returns columns, rows and the deflated data of a PNG of 16 bits of grey.
+/// Returns columns, rows and the deflated data of a PNG of 16-bit grey.
 fn parts(data: &[u8]) -> Option<(u32, u32, Vec<u8>)> {
     let mut rest = data.strip_prefix(SIGNATURE)?;
     let mut size = None;
@@ -65,7 +66,7 @@ fn parts(data: &[u8]) -> Option<(u32, u32, Vec<u8>)> {
             (b"IHDR", header) if size.is_none() => size = Some(size_of(header)?),
             (b"IDAT", part) => stream.extend_from_slice(part),
             (b"IEND", _) => break,
-            // Chunks that a decoder may skip leave the values alone, except transparency.
+            // Chunks that a decoder may skip do not affect the values, except transparency.
             (kind, _) if kind[0].is_ascii_lowercase() && kind != b"tRNS" => {}
             _ => return None,
         }
@@ -80,14 +81,14 @@ fn size_of(header: &[u8]) -> Option<(u32, u32)> {
     (kind == DEEP_GREY).then(|| (u32::from_be_bytes(*width), u32::from_be_bytes(*height)))
 }
 
-/// Gives the inflated data to `take`, as blocks of so many bytes; the last one may be shorter.
+/// Passes the inflated data to `take` in blocks of this size; the last one may be shorter.
 fn inflate(
     mut stream: &[u8],
     block: usize,
     mut take: impl FnMut(&[u8]) -> Option<()>,
 ) -> Option<()> {
     let mut inflater = fdeflate::Decompressor::new();
-    // The checksums of the chunks tell already that they are whole.
+    // The checksums of the chunks already show that they are intact.
     inflater.ignore_adler32();
     // Small enough to stay in the cache.
     let mut window = vec![0; 4 * HISTORY + block];
@@ -113,11 +114,11 @@ fn inflate(
     }
 }
 
-/// The last row that is complete, and a buffer for the next ones.
+/// The last complete row, and a buffer for the next ones.
 struct Above {
-    /// Bytes of the row; with padding behind it for the steps after the first row's end.
+    /// Bytes of the row, followed by padding for the steps after the end of the first row.
     row: Vec<[u8; 2]>,
-    /// Pixels of eight rows by step, each row a step behind the one above.
+    /// Pixels of eight rows by step, each row one step behind the one above.
     steps: Vec<[u8; LANES]>,
     width: usize,
 }
@@ -128,7 +129,7 @@ impl Above {
         Self { row: vec![[0; 2]; steps], steps: vec![[0; LANES]; steps], width }
     }
 
-    /// Undoes the filters of at most [`ROWS`] rows; `None` if one is unknown.
+    /// Undoes the filters of at most [`ROWS`] rows; `None` if a filter is unknown.
     fn undo(
         &mut self,
         filtered: &[u8],
@@ -156,7 +157,7 @@ impl Above {
         Some(())
     }
 
-    /// Undoes the filters of rows in their lanes of the steps.
+    /// Undoes the filters of rows in the lanes of the steps.
     fn undo_aslant<'a>(&mut self, rows: impl Iterator<Item = &'a [u8]>) -> Option<()> {
         let mut filters = Filters::default();
         for (r, row) in rows.enumerate() {
@@ -170,7 +171,7 @@ impl Above {
     }
 }
 
-/// Undoes a filter up to [`LAST_SIMPLE`], in place of the row above.
+/// Undoes a filter up to [`LAST_SIMPLE`]; the result replaces the row above.
 fn undo_simple(filter: u8, filtered: &[[u8; 2]], row: &mut [[u8; 2]]) {
     let both = row.iter_mut().zip(filtered);
     match filter {
@@ -213,13 +214,14 @@ impl Filters {
     }
 }
 
-/// Undoes the filters of eight rows. Left of a row its lanes are 0, as are the predictions there.
+/// Undoes the filters of eight rows. To the left of a row its lanes are 0, as the predictions there
+/// have to be.
 fn undo_steps(steps: &mut [[u8; LANES]], above: &[[u8; 2]], filters: &Filters) {
     let mut a = [0; LANES];
     let mut b = [0; LANES];
     for (step, top) in steps.iter_mut().zip(above) {
         let c = b;
-        // Above a pixel is that of the step before, a row further up.
+        // The pixel above is that of the previous step, one row further up.
         b[..2].copy_from_slice(top);
         b[2..].copy_from_slice(&a[..LANES - 2]);
         for i in 0..LANES {
@@ -233,20 +235,21 @@ fn undo_steps(steps: &mut [[u8; LANES]], above: &[[u8; 2]], filters: &Filters) {
     }
 }
 
-/// Returns the mean, rounded down, without a wider number.
+/// Returns the mean, rounded down, without a wider integer type.
 #[inline(always)]
 fn mean(a: u8, b: u8) -> u8 {
     (a & b).wrapping_add((a ^ b) >> 1)
 }
 
-/// Returns the difference, of which `abs_diff` makes wider numbers.
+/// Returns the absolute difference; `abs_diff` would compile to wider integers.
 #[inline(always)]
 fn distance(a: u8, b: u8) -> u8 {
     a.max(b).wrapping_sub(a.min(b))
 }
 
-/// Returns which of the left, the upper and the upper left byte is nearest to `a + b - c`; of
-/// equals the first. Without a branch and in bytes, of which vector instructions take most.
+/// Returns the one of the left, the upper and the upper left byte that is nearest to `a + b - c`,
+/// and of equal ones the first. It uses no branches and only bytes, of which vector instructions
+/// process the most.
 #[inline(always)]
 fn paeth(a: u8, b: u8, c: u8) -> u8 {
     let to_a = distance(b, c);

@@ -1,9 +1,9 @@
-//! Disparity: `stereo_msgs/DisparityImage`, and images of disparity alone. Depth is focal length
+//! Disparity: `stereo_msgs/DisparityImage`, and plain images of disparity. Depth is focal length
 //! times baseline, divided by disparity.
 //!
-//! Disparities are pixels, or fractions of them: floating and 8-bit disparity count whole pixels,
-//! `16SC1` sixteenths, as OpenCV's block matchers write them. For unsigned 16 bits there are
-//! several conventions (16 or 256 parts of a pixel), so their unit has to be told.
+//! Disparities are in pixels, or in fractions of them: floating-point and 8-bit disparities are
+//! whole pixels, `16SC1` sixteenths, as OpenCV's block matchers write them. For unsigned 16 bits
+//! there are several conventions (16 or 256 parts of a pixel), so the unit has to be given.
 
 use tagalong_core::{DepthImage, Image as Plane};
 
@@ -12,10 +12,10 @@ use super::{ImageError, Pixels, check_size, decode_compressed, decode_raw};
 use crate::Limits;
 use crate::msgs::{CompressedImage, DisparityImage, Image, RegionOfInterest};
 
-/// Fraction of a pixel that `16SC1` counts.
+/// Unit of `16SC1`, pixels.
 const SIXTEENTH_PX: f64 = 1.0 / 16.0;
 
-/// Depth from disparities.
+/// Depth computed from disparities.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct DepthFromDisparity {
@@ -40,13 +40,13 @@ pub(crate) fn may_be_disparity(encoding: &str) -> bool {
     ["32FC1", "mono8", "8UC1", "16SC1", "mono16", "16UC1"].contains(&encoding)
 }
 
-/// Decodes a disparity image with the geometry that it states. A disparity is invalid if it is not
-/// positive and finite, outside of the range that was searched, or outside of the valid window; a
-/// range or window of size 0 is none. `unit_px` (pixels per unit) replaces the convention of the
-/// encoding, `depth_unit_m` metres as unit of the baseline.
+/// Decodes a disparity image with the geometry that it contains. A disparity is invalid if it is
+/// not positive and finite, outside of the range that was searched, or outside of the valid window;
+/// a range or window of size 0 means that there is none. `unit_px` (pixels per unit) replaces the
+/// convention of the encoding, `depth_unit_m` the metre as unit of the baseline.
 ///
 /// # Errors
-/// [`ImageError`]: as of [`decode_raw`]; focal length or baseline that are not positive; unsigned
+/// [`ImageError`]: as for [`decode_raw`]; focal length or baseline that are not positive; unsigned
 /// 16 bits without `unit_px`.
 pub fn decode_disparity(
     message: &DisparityImage<'_>,
@@ -66,7 +66,7 @@ pub fn decode_disparity(
     geometry.depth(&values, |x, y, disparity| range.contains(&disparity) && holds(window, x, y))
 }
 
-/// Decodes an image whose pixels are disparities, and which says nothing of its geometry.
+/// Decodes an image whose pixels are disparities, and which does not contain its geometry.
 ///
 /// # Errors
 /// As [`decode_disparity`].
@@ -79,7 +79,8 @@ pub fn decode_plain_disparity(
     geometry.depth(&values_of(image, unit_px, limits)?, |_, _, _| true)
 }
 
-/// Decodes a compressed image whose pixels are disparities: a PNG, because JPEG changes them.
+/// Decodes a compressed image whose pixels are disparities. It must be a PNG, because JPEG changes
+/// them.
 ///
 /// # Errors
 /// As [`decode_disparity`].
@@ -90,7 +91,7 @@ pub fn decode_compressed_disparity(
     limits: &Limits,
 ) -> Result<DepthFromDisparity, ImageError> {
     if image.data.starts_with(&[0xff, 0xd8]) {
-        return Err(ImageError::Codec("disparities in a JPEG, which changes them".into()));
+        return Err(ImageError::Codec("disparities as JPEG, which changes their values".into()));
     }
     let pixels = decode_compressed(image, Some(1.0), limits)?;
     let unit_px = match pixels {
@@ -126,7 +127,7 @@ impl StereoGeometry {
     }
 }
 
-/// Returns true for pixels inside of a window; one without an area is none.
+/// Returns true for pixels inside of a window; a window without an area contains none.
 fn holds(window: &RegionOfInterest, x: usize, y: usize) -> bool {
     window.width == 0
         || window.height == 0

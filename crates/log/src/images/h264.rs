@@ -1,5 +1,5 @@
-//! Video in H.264 (ITU-T H.264, annex B), packet by packet: each is one picture, which may refer to those
-//! before it.
+//! Video in H.264 (ITU-T H.264, annex B), packet by packet: each contains one picture, which may
+//! refer to earlier ones.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -13,8 +13,9 @@ use super::{ImageError, check_size};
 use crate::Limits;
 use crate::msgs::{Header, Image, encode};
 
-/// Most places by which a picture between two others lies before the one that was shown last: sixteen
-/// pictures, each of which may count as two halves. A place farther back is a count that began anew.
+/// Maximum distance in display order between a B-frame and the picture that was shown last: sixteen
+/// pictures, each of which may count as two fields. A larger distance means that the count was
+/// restarted.
 const MOST_BACK: i32 = 32;
 
 /// Outcome of a packet.
@@ -22,24 +23,25 @@ const MOST_BACK: i32 = 32;
 pub(crate) enum Picture {
     /// An `nv12` image as the bytes of a `sensor_msgs/Image`.
     Whole(Vec<u8>),
-    /// The packet refers to pictures that are not there: none until the next key picture.
+    /// The packet refers to missing pictures: there are none until the next key frame.
     Waits,
-    /// The picture belongs before one with an earlier stamp: the stamps are those of the packets.
+    /// The picture belongs before one with an earlier stamp, because the stamps are those of the
+    /// packets.
     OutOfOrder,
-    /// The packet has no picture, but parameters alone.
+    /// The packet contains only parameters and no picture.
     Parameters,
 }
 
-/// Decoder of one topic, which takes all of its packets in their order.
+/// Decoder of one topic, to which all of its packets are passed in order.
 pub(crate) struct VideoDecoder {
     decoder: Decoder,
     limits: Limits,
     sps: Option<Sps>,
-    /// True after a key picture, as long as each packet followed on the one before it.
+    /// True after a key frame, as long as no packet is missing.
     is_whole: bool,
-    /// Number of the last picture to which others refer.
+    /// Frame number of the last reference picture.
     last: u32,
-    /// Place in the order of display, and stamp, of the last picture shown since the key picture.
+    /// Display order and stamp of the last picture that was shown since the key frame.
     shown: Option<(i32, Stamp)>,
 }
 
@@ -49,14 +51,15 @@ impl VideoDecoder {
         Self { decoder: Decoder::new(), limits, sps: None, is_whole: false, last: 0, shown: None }
     }
 
-    /// Decodes a packet to an image with this header.
+    /// Decodes a packet into an image with this header.
     ///
     /// # Errors
-    /// [`ImageError`]: a damaged packet, a size beyond the limits, or pixels of another kind than 8
-    /// bits with halved colours. No picture follows until the next key picture.
+    /// [`ImageError`]: a damaged packet, a size beyond the limits, or a pixel format other than 8
+    /// bits with 4:2:0 chroma. No picture follows until the next key frame.
     pub(crate) fn decode(&mut self, packet: &[u8], header: Header) -> Result<Picture, ImageError> {
         let packet = &*with_start_codes(packet);
-        // The decoder is a young one, and a log may hold any bytes: a panic is a damaged packet.
+        // The decoder is a young one, and a log may contain any bytes, so a panic counts as a
+        // damaged packet.
         match catch_unwind(AssertUnwindSafe(|| self.take(packet))) {
             Ok(Ok(Some(frame))) if self.is_out_of_order(&frame, header.stamp()) => {
                 Ok(Picture::OutOfOrder)
@@ -118,8 +121,8 @@ impl VideoDecoder {
         self.decoder.decode_nal(unit).map(|_| ()).map_err(damaged)
     }
 
-    /// Returns true if a picture is shown before the last one and has a later stamp, as where packets
-    /// with pictures between two others (B-frames) are stamped when they are published.
+    /// Returns true if a picture is displayed before the last one but has a later stamp, as happens
+    /// if packets with B-frames are stamped when they are published.
     fn is_out_of_order(&mut self, frame: &Frame, stamp: Stamp) -> bool {
         let place = frame.pic_order_cnt;
         let is_out = self.shown.is_some_and(|(shown, last)| {
@@ -148,7 +151,7 @@ impl VideoDecoder {
         Ok(encode(&Image { step: frame.width, ..image }))
     }
 
-    /// Returns true if a picture follows on the last one: the numbers of pictures to which others refer
+    /// Returns true if a picture follows the last one: the frame numbers of reference pictures
     /// count up, and a gap means that a packet was lost.
     fn follows_on(&mut self, unit: &NalUnit<'_>) -> Result<bool, ImageError> {
         let Some(sps) = &self.sps else { return Ok(false) };
@@ -168,7 +171,8 @@ impl VideoDecoder {
 /// one.
 ///
 /// # Errors
-/// [`ImageError`]: damaged parameters, a size beyond the limits, or pixels that are not decoded.
+/// [`ImageError`]: damaged parameters, a size beyond the limits, or a pixel format that is not
+/// decoded.
 pub(crate) fn size_of_video(
     packet: &[u8],
     limits: &Limits,
@@ -182,8 +186,8 @@ pub(crate) fn size_of_video(
     Ok(Some((sps.width(), sps.height())))
 }
 
-/// Reads a sequence parameter set whose pictures are within the limits, and have 8 bits and halved
-/// colours.
+/// Reads a sequence parameter set, and checks that its pictures are within the limits and have 8
+/// bits with 4:2:0 chroma.
 fn checked(unit: &NalUnit<'_>, limits: &Limits) -> Result<Sps, ImageError> {
     let sps = parse_sps(&unit.rbsp).map_err(damaged)?;
     let deepest = sps.bit_depth_luma_minus8.max(sps.bit_depth_chroma_minus8);
@@ -199,7 +203,7 @@ fn checked(unit: &NalUnit<'_>, limits: &Limits) -> Result<Sps, ImageError> {
             8 + deepest
         )));
     }
-    // Without the part that is cut off, for which the decoder takes memory as well.
+    // The size before cropping, because the decoder allocates memory for all of it.
     let width = 16 * (u64::from(sps.pic_width_in_mbs_minus1) + 1);
     let height = 16 * (u64::from(sps.pic_height_in_map_units_minus1) + 1);
     let fields = if sps.frame_mbs_only_flag { 1 } else { 2 };
@@ -213,17 +217,18 @@ fn is_at_unit(packet: &[u8]) -> bool {
     packet.is_empty() || zeros >= 2 && packet.get(zeros) == Some(&1)
 }
 
-/// Returns true if the units have a picture that does not begin with its first block.
+/// Returns true if the units have a picture whose first macroblock is missing.
 fn lacks_first_block(units: &[NalUnit<'_>]) -> bool {
     let Some(picture) = units.iter().find(|unit| is_picture(unit)) else { return false };
     Bits { bytes: &picture.rbsp, at: 0 }.exponential() != Some(0)
 }
 
-/// Bytes that are put behind a packet; neither zeros, as the decoder reads there, nor a start code.
+/// Bytes that are appended to a packet; neither zeros, which the decoder reads there by itself, nor
+/// a start code.
 const BEHIND: [u8; 64] = [0x5a; 64];
 
-/// Returns true if a packet with parameters and a key picture lacks its end: the picture is another one
-/// with other bytes behind it.
+/// Returns true if a packet with parameters and a key frame lacks its end: the picture then changes
+/// if other bytes follow it.
 fn is_cut_short(packet: &[u8], seen: &Frame) -> bool {
     let longer = [packet, &BEHIND].concat();
     let units = parse_annex_b(&longer);
@@ -234,7 +239,7 @@ fn is_cut_short(packet: &[u8], seen: &Frame) -> bool {
     }
     let mut decoder = Decoder::new();
     for unit in &units {
-        // As in the picture that was seen, an error shows in its pixels.
+        // As for the picture before, an error shows in its pixels.
         let _ = decoder.decode_nal(unit);
     }
     let other = decoder.flush();
@@ -253,10 +258,10 @@ fn damaged(why: impl std::fmt::Debug) -> ImageError {
     ImageError::Codec(format!("a packet of H.264: {why:?}"))
 }
 
-/// Returns the number of a picture from the header of its slice (7.3.3); `bits` long.
+/// Returns the frame number of a picture, which is `bits` long, from its slice header (7.3.3).
 fn picture_number(rbsp: &[u8], bits: u32) -> Option<u32> {
     let mut reader = Bits { bytes: rbsp, at: 0 };
-    // The first block, the type of the slice and its picture parameters stand before it.
+    // It is preceded by the first macroblock, the slice type and the picture parameter set.
     for _ in 0..3 {
         reader.exponential()?;
     }
@@ -285,7 +290,8 @@ impl Bits<'_> {
         Some(value)
     }
 
-    /// Reads a number in the code of Golomb: as many bits behind the first one as zeros before it.
+    /// Reads an exponential-Golomb code: after the first one bit there are as many bits as zeros
+    /// before it.
     fn exponential(&mut self) -> Option<u64> {
         let mut zeros = 0;
         while self.bit()? == 0 {

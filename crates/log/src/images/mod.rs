@@ -1,25 +1,26 @@
 //! Decoding of image messages.
 //!
-//! Depth becomes metres along the optical axis, with NaN for "no reading": 0 and 65535 of integer
-//! depth, and 0, negative, infinite and NaN values of floating depth (REP 117 and 118 give
-//! infinities a meaning of their own, which no detector here uses).
+//! Depth is converted to metres along the optical axis, with NaN for "no reading": 0 and 65535 of
+//! integer depth, and 0, negative, infinite and NaN values of floating-point depth (REP 117 and 118
+//! give infinities a meaning of their own, which no detector here uses).
 //!
-//! Images make the frames of a log, so that a new message type with images takes more places than
-//! a sensor beside them (`crates/log/src/sensors`):
+//! The frames of a log are made from images, so a new message type with images needs changes in
+//! more files than another sensor (`crates/log/src/sensors`):
 //!
 //! 1. `msgs`: a struct with the fields of the ROS message in their order, and its definition as a
 //!    file in `crates/log/msgs`.
 //! 2. Here: a file that decodes the pixels, and reads their size without decoding them.
 //! 3. `scan.rs`: a variant of `Type`, its name in `Type::of`, and a `take_...` that reads encoding
 //!    and size from the first message.
-//! 4. `topics/kinds.rs`: `is_image`, and `is_picture` if it is no depth: the uses of the topic.
-//! 5. `source/intake.rs` (`payload`) for the stamp, `source/assemble.rs` (`AnyImage` and `read`) for
-//!    the pixels, `source/restamp.rs` for times of recording.
+//! 4. `topics/kinds.rs`: `is_image`, and `is_picture` unless it is depth: the uses of the topic.
+//! 5. `source/intake.rs` (`payload`) for the stamp, `source/assemble.rs` (`AnyImage` and `read`)
+//!    for the pixels, `source/restamp.rs` for recording times.
 //! 6. Live: `listen` in `bridges/ros2/src/network.rs`. Copies without faces:
 //!    `crates/cli/src/commands/blur/topics.rs`. For users: the table of inputs in `docs/logs.md`.
 //!
-//! The compiler names the matches over `Type` in `scan.rs` and `restamp.rs`, and those over
-//! `AnyImage`. The others have an arm for the rest, and leave a forgotten type unread.
+//! The compiler reports the missing arms of matches over `Type` in `scan.rs` and `restamp.rs`, and
+//! of those over `AnyImage`. The other matches have a default arm, so that a forgotten type is not
+//! read.
 
 mod bayer;
 mod cloud;
@@ -71,7 +72,7 @@ impl Pixels {
     }
 }
 
-/// Reason for which an image message was not decoded.
+/// Reason why an image message was not decoded.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageError {
@@ -82,25 +83,25 @@ pub enum ImageError {
          where `depth_unit_m` is set); compressed as jpeg, png or compressedDepth"
     )]
     Encoding(String),
-    /// Colour with 16 bits a channel.
+    /// Colour with 16 bits per channel.
     #[error(
         "encoding `{0}` has 16 bits a channel, which no pipeline uses: let the driver publish 8 \
          bits (rgb8 or bayer_rggb8, say)"
     )]
     Deep(String),
-    /// An encoding that holds no disparities.
+    /// An encoding that cannot hold disparities.
     #[error(
         "disparities as `{0}`; known: 32FC1, 8UC1, mono8, 16SC1, and 16UC1, mono16 where \
          `disparity.unit_px` is set under [input]"
     )]
     NoDisparity(String),
-    /// Disparities in a unit for which there is no convention.
+    /// Disparities whose unit has no convention.
     #[error(
-        "disparities as `{0}`, for which there is no one unit: set `disparity.unit_px` under \
-         [input] (0.0625 for 16 parts of a pixel, 0.00390625 for 256)"
+        "disparities as `{0}`, which has no fixed unit: set `disparity.unit_px` under [input] \
+         (0.0625 for 16 parts of a pixel, 0.00390625 for 256)"
     )]
     Unit(String),
-    /// Disparities without a geometry that makes depth of them.
+    /// Disparities whose geometry gives no depth.
     #[error(
         "disparities with f = {focal_px} px and T = {baseline_m} m, which have to be positive: \
          publish them with the calibration of the stereo camera"
@@ -119,10 +120,10 @@ pub enum ImageError {
         /// Rows in the message.
         height: u64,
     },
-    /// `step` or the length of the data contradict the size.
+    /// `step` or the length of the data contradicts the size.
     #[error("{0}")]
     Layout(String),
-    /// Points that are not those of an image.
+    /// Points that do not form an image.
     #[error("{0}")]
     Cloud(String),
     /// The compressed bytes are damaged or of an unknown kind.
@@ -146,7 +147,7 @@ impl ImageError {
     }
 }
 
-/// Content of an encoding or format, as far as its name shows it.
+/// Content of an encoding or format, if its name shows it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Content {
@@ -175,7 +176,7 @@ pub fn content_of_encoding(encoding: &str, depth_unit_m: Option<f64>) -> Content
     }
 }
 
-/// Returns the reason for which images of an encoding or format cannot be read, with the remedy.
+/// Returns the reason why images of an encoding or format cannot be read, with the remedy.
 pub(crate) fn refusal_of(pixels: &str) -> String {
     let lower = pixels.to_ascii_lowercase();
     let video = ["h264", "h265", "hevc", "avc", "ffmpeg", "theora", "av1", "vp8", "vp9"];
@@ -194,7 +195,7 @@ pub(crate) const VIDEO_REMEDY: &str = "of video H.264 alone is decoded: record t
      of a log that exists can be republished as jpeg while it plays (`ros2 run image_transport republish \
      ffmpeg compressed`, or with `foxglove` or `theora` in place of `ffmpeg`) and recorded again";
 
-/// Returns true for colour with 16 bits a channel.
+/// Returns true for colour with 16 bits per channel.
 fn is_deep(encoding: &str) -> bool {
     let colour = ["rgb", "bgr", "bayer_"].iter().any(|start| encoding.starts_with(start));
     (colour && encoding.ends_with("16")) || ["16UC3", "16UC4"].contains(&encoding)
@@ -212,7 +213,7 @@ pub fn content_of_format(format: &str) -> Content {
     }
 }
 
-/// Checks a size against the limits; the product is taken in 64 bits.
+/// Checks a size against the limits; the product is computed in 64 bits.
 fn check_size(
     width: u64,
     height: u64,

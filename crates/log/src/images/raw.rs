@@ -64,8 +64,8 @@ pub fn decode_raw(
         }
         _ => {
             let unit = depth_unit_m.unwrap_or(0.001) as f32;
-            // The order of bytes is known in each loop: one that asks a function for it is no
-            // vector instruction.
+            // The byte order is fixed in each loop: a loop that calls a function for it would not
+            // become vector instructions.
             Pixels::Depth(if big {
                 rows.plane(|p: [u8; 2]| metres(u16::from_be_bytes(p), unit))
             } else {
@@ -80,7 +80,7 @@ pub fn decode_raw(
 enum Layout {
     Yuv(yuv::Order),
     Bayer(bayer::Pattern),
-    /// Pixels one after the other, of as many bytes each.
+    /// Consecutive pixels with this number of bytes each.
     Packed(u64),
 }
 
@@ -102,7 +102,7 @@ impl Layout {
         }))
     }
 
-    /// Returns the bytes of a pixel in the message or decoded, whichever are more.
+    /// Returns the bytes per pixel in the message or after decoding, whichever is more.
     fn bytes_per_pixel(&self) -> u64 {
         match self {
             Self::Packed(bytes) => DECODED_BYTES.max(*bytes),
@@ -123,7 +123,7 @@ pub(super) struct Rows<'a> {
 }
 
 impl<'a> Rows<'a> {
-    /// Checks `count` rows of `row_bytes` each, and padding behind them.
+    /// Checks `count` rows of `row_bytes` each, followed by padding.
     pub(super) fn new(
         image: &Image<'a>,
         count: usize,
@@ -132,7 +132,7 @@ impl<'a> Rows<'a> {
         let width = image.width as usize;
         let height = image.height as usize;
         let step = image.step as usize;
-        // In 64 bits, where the product of two 32-bit numbers cannot overflow.
+        // Computed in 64 bits, where the product of two 32-bit numbers cannot overflow.
         let expected = u64::from(image.step) * count as u64;
         if step < row_bytes {
             return Err(ImageError::Layout(format!(
@@ -166,7 +166,7 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// Makes an image from pixels that are known to be `width * height`.
+/// Creates an image from pixels whose number is known to be `width * height`.
 #[expect(clippy::expect_used, reason = "the callers have made exactly this many pixels")]
 pub(super) fn exact<P: Copy>(width: usize, height: usize, pixels: Vec<P>) -> Plane<P> {
     Plane::from_pixels(width, height, pixels).expect("width * height pixels")

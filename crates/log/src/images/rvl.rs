@@ -7,15 +7,15 @@
 
 /// Bits that say that another nibble follows.
 const MORE: u64 = 0x8888_8888_8888_8888;
-/// Nibbles of numbers that are read at once.
+/// Number of nibbles of numbers that are read at once.
 const SHORT: u32 = 5;
 
 /// Reader of numbers from a stream of nibbles.
 struct Nibbles<'a> {
     words: std::slice::Iter<'a, [u8; 4]>,
-    /// Nibbles that are read next, the first highest; zeros behind the last of them.
+    /// Next nibbles to be read, the first in the highest bits; zeros follow the last one.
     next: u64,
-    /// Number of these.
+    /// Number of nibbles in `next`.
     count: u32,
 }
 
@@ -45,7 +45,7 @@ impl<'a> Nibbles<'a> {
         if length > SHORT.min(self.count) {
             return self.long_number();
         }
-        // Without branches on the length, which is as good as random.
+        // Without branches on the length, which is practically random.
         let digits = (0..SHORT)
             .fold(0, |value, i| value | ((self.next >> (60 - 4 * i)) as u32 & 7) << (3 * i));
         self.drop_first(length);
@@ -54,7 +54,7 @@ impl<'a> Nibbles<'a> {
 
     fn long_number(&mut self) -> Option<u32> {
         let mut value = 0;
-        // Eleven nibbles hold 32 bits; a longer number is damage.
+        // Eleven nibbles hold 32 bits, so a longer number means damage.
         for shift in (0..32).step_by(3) {
             self.refill();
             if self.count == 0 {
@@ -71,8 +71,8 @@ impl<'a> Nibbles<'a> {
     }
 }
 
-/// Decodes the `count` values of a stream to what `pixel` makes of them; `None` if it ends early or
-/// holds more.
+/// Decodes the `count` values of a stream and converts each with `pixel`; `None` if the stream ends
+/// early or contains more.
 pub(super) fn decode<P: Copy>(
     bytes: &[u8],
     count: usize,
@@ -83,7 +83,7 @@ pub(super) fn decode<P: Copy>(
     let mut at = 0_usize;
     let mut last = 0_u16;
     while at < count {
-        // A damaged run may claim any length: the bounds of `out` tell.
+        // A damaged run may claim any length; the bounds check on `out` catches it.
         at = at.saturating_add(nibbles.number()? as usize);
         let readings = nibbles.number()? as usize;
         for value in out.get_mut(at..)?.get_mut(..readings)? {

@@ -1,5 +1,5 @@
-//! Video in image messages, told by its bytes: some drivers publish it as `sensor_msgs/CompressedImage`
-//! with any format, also with `jpeg` or none.
+//! Video in image messages, recognised by its bytes: some drivers publish it as
+//! `sensor_msgs/CompressedImage` with any format, even with `jpeg` or none.
 
 use std::borrow::Cow;
 
@@ -8,7 +8,7 @@ use crate::msgs::{CdrError, CompressedImage, CompressedVideo, FfmpegPacket, Head
 /// Name of the codec that is decoded.
 pub(crate) const H264: &str = "h264";
 
-/// Packet of video, whatever message it came in.
+/// Video packet, whatever message it came in.
 pub(crate) struct Packet<'a> {
     /// Time of the picture, and frame of the camera.
     pub(crate) header: Header,
@@ -19,7 +19,7 @@ pub(crate) struct Packet<'a> {
 }
 
 impl<'a> Packet<'a> {
-    /// Reads a message of a type with packets.
+    /// Reads a message of a type that carries packets.
     pub(crate) fn of(schema: &str, message: &'a [u8]) -> Result<Self, CdrError> {
         match schema.rsplit('/').next() {
             Some("CompressedVideo") => {
@@ -39,21 +39,21 @@ impl<'a> Packet<'a> {
     }
 }
 
-/// Start code before each unit of a packet (ITU-T H.264 and H.265, annex B).
+/// Start code that precedes each unit of a packet (ITU-T H.264 and H.265, annex B).
 const START_CODE: [u8; 4] = [0, 0, 0, 1];
 
-/// Reason for which packets with lengths alone give no picture, with the remedy.
+/// Reason why packets with lengths alone give no picture, with the remedy.
 pub(crate) const NO_PARAMETERS: &str = "its packets have lengths in place of start codes (AVCC), and the parameters of the stream are not \
      among them: let the encoder write start codes (annex B), and parameters before each key picture";
 
-/// Returns the units of a packet with their lengths in place of start codes, as in MP4 files (ISO/IEC
-/// 14496-15); `None` unless the lengths add up to the whole packet.
+/// Returns the units of a packet that has their lengths in place of start codes, as in MP4 files
+/// (ISO/IEC 14496-15); `None` unless the lengths add up to the whole packet.
 fn units_by_length(packet: &[u8]) -> Option<Vec<&[u8]>> {
     let mut units = Vec::new();
     let mut rest = packet;
     while let Some((length, behind)) = rest.split_first_chunk::<4>() {
         let length = usize::try_from(u32::from_be_bytes(*length)).ok()?;
-        // A length of one is a start code.
+        // A length of one would be a start code.
         if length < 2 {
             return None;
         }
@@ -64,7 +64,7 @@ fn units_by_length(packet: &[u8]) -> Option<Vec<&[u8]>> {
     (rest.is_empty() && !units.is_empty()).then_some(units)
 }
 
-/// Returns true for a packet with lengths in place of start codes.
+/// Returns true for a packet that has lengths in place of start codes.
 pub(crate) fn has_lengths(packet: &[u8]) -> bool {
     units_by_length(packet).is_some()
 }
@@ -80,26 +80,27 @@ pub(crate) fn with_start_codes(packet: &[u8]) -> Cow<'_, [u8]> {
     Cow::Owned(bytes)
 }
 
-/// Returns the codec of a packet of video; `None` for everything else.
+/// Returns the codec of a video packet; `None` for everything else.
 ///
-/// The packets of H.264 and H.265 begin with a start code, or the length of a unit, and a unit that
-/// begins a picture.
+/// Packets of H.264 and H.265 begin with a start code, or with the length of a unit, and then with
+/// a unit that starts a picture.
 pub(crate) fn video_codec(data: &[u8]) -> Option<&'static str> {
     let data = &*with_start_codes(data);
     let unit = data.strip_prefix(&START_CODE).or_else(|| data.strip_prefix(&[0, 0, 1]))?;
     let &[first, second, ..] = unit else { return None };
-    // The kind of a unit says whether others refer to it.
+    // The type of a unit shows whether others refer to it.
     let is_reference = first & 0x60 != 0;
     let is_h264 = match first & 0x1f {
         // A picture.
         1 => true,
-        // A key picture, and parameters.
+        // A key frame, and parameters.
         5 | 7 | 8 => is_reference,
-        // Further information, and a delimiter.
+        // Supplemental information, and a delimiter.
         6 | 9 => !is_reference,
         _ => false,
     };
-    // Layer 0 and temporal layer 0. Pictures, key pictures, parameters, delimiters, further information.
+    // Layer 0 and temporal layer 0: pictures, key frames, parameters, delimiters, supplemental
+    // information.
     let is_h265 =
         first & 1 == 0 && second == 1 && matches!(first >> 1, 1..=9 | 16..=21 | 32..=35 | 39);
     // The highest bit is always 0.

@@ -1,5 +1,4 @@
-//! Brightness and colour apart, with fewer samples of colour: BT.601 with 16 to 235, as OpenCV's
-//! `cvtColor`.
+//! YUV images with subsampled chroma: BT.601 in the range 16 to 235, as in OpenCV's `cvtColor`.
 
 use tagalong_core::RgbImage;
 
@@ -7,7 +6,7 @@ use super::ImageError;
 use super::raw::{Rows, exact};
 use crate::msgs::Image;
 
-/// Bits behind the point of the factors.
+/// Number of fractional bits of the factors.
 const SHIFT: i32 = 20;
 const BRIGHTNESS: i32 = 1_220_542;
 const RED_OF_V: i32 = 1_673_527;
@@ -15,14 +14,14 @@ const GREEN_OF_U: i32 = -409_993;
 const GREEN_OF_V: i32 = -852_492;
 const BLUE_OF_U: i32 = 2_116_026;
 
-/// Order of brightness and colour in memory.
+/// Order of luma and chroma in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Order {
-    /// Four bytes for two pixels, with the places of Y of both, U and V.
+    /// Four bytes for two pixels, with the positions of both Y, U and V.
     Packed([usize; 4]),
-    /// All of Y, then a row of colour pairs for each two rows; the place of U in a pair.
+    /// All of Y, then a row of chroma pairs for every two rows; with the position of U in a pair.
     TwoPlanes(usize),
-    /// All of Y, then a colour pair for each pixel; the place of U in a pair.
+    /// All of Y, then a chroma pair for each pixel; with the position of U in a pair.
     FullPlanes(usize),
 }
 
@@ -30,7 +29,7 @@ impl Order {
     /// Returns the order of an encoding; `None` for any other encoding.
     pub(super) fn of(encoding: &str) -> Option<Self> {
         Some(match encoding {
-            // ROS calls it `yuv422`, drivers by the order of the bytes.
+            // ROS calls it `yuv422`; drivers name it by the order of the bytes.
             "yuv422" | "uyvy" => Self::Packed([1, 3, 0, 2]),
             "yuv422_yuy2" | "yuyv" => Self::Packed([0, 2, 1, 3]),
             "nv12" => Self::TwoPlanes(0),
@@ -44,7 +43,7 @@ impl Order {
 /// Decodes an image.
 ///
 /// # Errors
-/// An odd size where pixels share their colour, and a length of the data that contradicts the size.
+/// An odd size where pixels share their chroma, and data whose length contradicts the size.
 pub(super) fn decode(image: &Image<'_>, order: Order) -> Result<RgbImage, ImageError> {
     let width = image.width as usize;
     let height = image.height as usize;
@@ -62,7 +61,7 @@ pub(super) fn decode(image: &Image<'_>, order: Order) -> Result<RgbImage, ImageE
     Ok(exact(width, height, pixels))
 }
 
-/// Checks that the pixels make pairs, in both directions if rows share their colour, too.
+/// Checks that the number of columns is even, and also that of rows if rows share their chroma.
 fn check_even(image: &Image<'_>, halves_rows: bool) -> Result<(), ImageError> {
     let Image { width, height, encoding, .. } = image;
     if !width.is_multiple_of(2) || (halves_rows && !height.is_multiple_of(2)) {
@@ -97,12 +96,12 @@ fn two_planes(rows: &Rows<'_>, u: usize) -> Vec<[u8; 3]> {
     out
 }
 
-/// Decodes planes of one resolution. A line of colour pairs takes two lines of brightness.
+/// Decodes planes of the same resolution. A line of chroma pairs is as long as two lines of luma.
 fn full_planes(image: &Image<'_>, u: usize) -> Result<Vec<[u8; 3]>, ImageError> {
     let width = image.width as usize;
     let height = image.height as usize;
-    // Drivers disagree on `step`, of which the common definition has one for all planes: if the
-    // lines have no padding, the length of the data tells.
+    // Drivers disagree on `step`, which by the usual definition is the same for all planes; if the
+    // lines have no padding, the length of the data decides.
     let is_dense = image.data.len() == 3 * width * height;
     let step = if is_dense { image.width } else { image.step };
     let rows = Rows::new(&Image { step, ..image.clone() }, 3 * height, width)?;

@@ -6,7 +6,7 @@ use super::record;
 use crate::Limits;
 use crate::walk::Source;
 
-/// Reason for which a chunk delivers no records.
+/// Reason why a chunk gives no records.
 pub(super) enum ChunkFault {
     /// The file ends inside the chunk.
     Truncated,
@@ -27,8 +27,8 @@ struct Head {
 }
 
 /// Reads a chunk record of `length` bytes and writes its records to `out`; returns true if their
-/// checksum was verified, false if there is none. After a fault, too, the source stands behind the
-/// record, unless the file ended.
+/// checksum was verified, false if there is none. Even after a fault the source is positioned
+/// behind the record, unless the file ended.
 pub(super) fn read<R: Read>(
     source: &mut Source<R>,
     length: u64,
@@ -38,7 +38,7 @@ pub(super) fn read<R: Read>(
     out.clear();
     let start = source.position();
     let result = read_parts(source, length, limits, out);
-    // A fault may leave a part of the chunk unread.
+    // After a fault a part of the chunk may be unread.
     let used = source.position() - start;
     let rest = length.saturating_sub(used);
     if source.skip(rest) < rest {
@@ -63,7 +63,7 @@ fn read_parts<R: Read>(
     }
     decompress(source, &head, out)?;
     if out.len() as u64 != head.uncompressed_size {
-        let why = format!("a chunk claims {} bytes and has others", head.uncompressed_size);
+        let why = format!("a chunk claims {} bytes, but has another size", head.uncompressed_size);
         return Err(skipped("damaged_chunks", why));
     }
     let has_crc = head.uncompressed_crc != 0;
@@ -73,10 +73,10 @@ fn read_parts<R: Read>(
     Ok(has_crc)
 }
 
-/// Reads start and end time, uncompressed size and checksum, compression, data size.
+/// Reads the header: start and end time, uncompressed size and checksum, compression, data size.
 fn read_head<R: Read>(source: &mut Source<R>, length: u64) -> Result<Head, ChunkFault> {
     let mut fixed = [0; 32];
-    // The fixed fields and both lengths, without the name of the compression.
+    // The fixed fields and both length fields, without the name of the compression.
     if length < 40 {
         return Err(skipped("damaged_chunks", "a chunk shorter than its own header"));
     }
@@ -120,12 +120,13 @@ fn decompress<R: Read>(
             return Err(skipped("unknown_compression_chunks", why));
         }
     };
-    outcome.map_err(|error| skipped("damaged_chunks", format!("a chunk does not unpack: {error}")))
+    outcome
+        .map_err(|error| skipped("damaged_chunks", format!("a chunk cannot be unpacked: {error}")))
 }
 
 /// Reads at most one byte more than promised, which is enough to detect a wrong size.
 fn fill_from(mut reader: impl Read, promised: u64, out: &mut Vec<u8>) -> std::io::Result<()> {
-    // At most 4 MiB in advance, because the promised size may be wrong.
+    // At most 4 MiB are reserved in advance, because the promised size may be wrong.
     out.reserve((promised as usize).min(1 << 22));
     reader.by_ref().take(promised + 1).read_to_end(out).map(drop)
 }

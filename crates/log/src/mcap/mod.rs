@@ -1,12 +1,13 @@
 //! Reader of the records of an MCAP file. See [`crate::LogWalker`] for the rules.
 //!
-//! The records of a chunk are delivered only after all of it was decompressed and its checksum
-//! verified.
+//! The records of a chunk are delivered only after the whole chunk has been decompressed and its
+//! checksum verified.
 //!
-//! The crate `mcap` parses schemas, channels and messages. The way from record to record is not that
-//! of its `sans_io::LinearReader`: this ends at the first record beyond its limit and at the first
-//! damaged chunk, without the place where the next record begins, and one limit holds for records
-//! and chunks. Here such a part is counted, with its place, and the walk goes on behind it.
+//! The crate `mcap` parses schemas, channels and messages, but its `sans_io::LinearReader` is not
+//! used for reading record by record: it stops at the first record beyond its limit and at the
+//! first damaged chunk, does not tell where the next record begins, and has one limit for both
+//! records and chunks. Here such a part is counted, with its position, and reading continues behind
+//! it.
 //!
 //! Source: the MCAP specification, version 0, sections "Records" and "Chunk".
 
@@ -28,7 +29,7 @@ use crate::error::NotMcap;
 use crate::msgs::ROS1_MARK;
 use crate::walk::{Channel, Located, Walk};
 
-/// Findings in an MCAP file that other containers do not have.
+/// State for an MCAP file that other containers do not have.
 #[derive(Default)]
 pub(crate) struct Mcap {
     schemas: BTreeMap<u16, (String, String, Arc<str>)>,
@@ -36,10 +37,10 @@ pub(crate) struct Mcap {
 }
 
 impl Mcap {
-    /// Starts behind the first eight bytes of a file.
+    /// Creates the reader behind the first eight bytes of a file.
     ///
     /// # Errors
-    /// [`NotMcap`] if they are not the magic of MCAP.
+    /// [`NotMcap`] if they are not the magic bytes of MCAP.
     pub(crate) fn behind(magic: &[u8]) -> Result<Self, NotMcap> {
         if magic == MAGIC {
             return Ok(Self::default());
@@ -50,12 +51,12 @@ impl Mcap {
     /// Reads one record from the file.
     pub(crate) fn step_in_file<R: Read>(&mut self, walk: &mut Walk<R>) {
         walk.offset = walk.source.position();
-        // The checksum of the data section covers the bytes before its closing record.
+        // The checksum of the data section covers the bytes before the record that closes it.
         let before = walk.source.crc();
         let mut head = [0; 9];
         match walk.source.fill(&mut head) {
             9 => {}
-            // The closing magic in place of a record: there is no footer.
+            // The closing magic bytes instead of a record: there is no footer.
             8 if head[..8] == *MAGIC => {
                 return walk.end_truncated("before its index is complete");
             }
@@ -152,11 +153,11 @@ impl Mcap {
         let Ok(Record::Schema { header, data }) = parse_record(op::SCHEMA, record) else {
             return None;
         };
-        // The number 0 stands for no schema.
+        // The ID 0 means that there is no schema.
         if is_too_long || header.id == 0 {
             return None;
         }
-        // Definitions in other languages are no text.
+        // Definitions in some schema languages are not text.
         let definition = Arc::from(std::str::from_utf8(&data).unwrap_or_default());
         let known = (header.name, header.encoding, definition);
         // The first definition is kept; later ones repeat it.
@@ -166,7 +167,7 @@ impl Mcap {
 
     fn learn_channel<R: Read>(&mut self, walk: &mut Walk<R>, body: Range<usize>) -> Option<()> {
         let record = &walk.buffer[body];
-        // Without its metadata, which nothing here reads and which need not be text.
+        // Excludes the metadata, which is not used here and need not be text.
         let end = record::end_of_fields(record, record::CHANNEL_HEAD, 2)?;
         let plain = [&record[..end], &record::NO_METADATA].concat();
         let Ok(Record::Channel(read)) = parse_record(op::CHANNEL, &plain) else { return None };
@@ -234,7 +235,7 @@ fn take_data_end<R: Read>(walk: &mut Walk<R>, length: u64, crc: u32) {
     let stored = walk.buffer.get(..4).map_or(0, |b| record::u32_at(b, 0));
     if stored != 0 && stored != crc {
         walk.fault("data_section_crc_failed", || {
-            "the checksum of the whole file is wrong: something in it was changed".into()
+            "the checksum of the whole file is wrong: its content was changed".into()
         });
     }
 }
@@ -245,7 +246,7 @@ fn locate_message<R: Read>(walk: &mut Walk<R>, body: Range<usize>) -> Option<()>
     if let Some(channel) = walk.channel_of(u32::from(header.channel_id)) {
         let mut data = body.start + record::MESSAGE_HEAD..body.end;
         if channel.encoding == bag::ENCODING {
-            // The mark takes the place of the last bytes of the head, which was read.
+            // The mark replaces the last bytes of the head, which has been read already.
             data.start -= ROS1_MARK.len();
             walk.buffer[data.start..][..ROS1_MARK.len()].copy_from_slice(&ROS1_MARK);
         }

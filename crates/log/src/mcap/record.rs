@@ -1,4 +1,4 @@
-//! Kinds of records of MCAP, and numbers in their heads.
+//! Types of MCAP records, and numbers in their heads.
 
 use mcap::records::op;
 
@@ -67,9 +67,9 @@ pub(crate) fn u64_at(bytes: &[u8], at: usize) -> u64 {
     u64::from(u32_at(bytes, at)) | u64::from(u32_at(bytes, at + 4)) << 32
 }
 
-/// Returns where the last of `count` fields ends that begin at `at` and are led by their lengths;
-/// `None` if one reaches beyond the record. The crate `mcap` reserves as much memory as a length says
-/// before it looks for the bytes.
+/// Returns the end of the last of `count` fields that begin at `at` and are preceded by their
+/// lengths; `None` if one reaches beyond the record. This check is needed because the crate `mcap`
+/// reserves as much memory as a length states before it reads the bytes.
 pub(super) fn end_of_fields(body: &[u8], at: usize, count: usize) -> Option<usize> {
     let mut end = at;
     for _ in 0..count {

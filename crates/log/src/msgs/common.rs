@@ -13,7 +13,7 @@ pub struct Time {
 }
 
 impl From<Stamp> for Time {
-    /// Converts a stamp; saturates in the year 2038, where ROS time ends.
+    /// Converts a stamp; it saturates in the year 2038, where ROS time ends.
     fn from(stamp: Stamp) -> Self {
         let sec = i32::try_from(stamp.nanos() / 1_000_000_000).unwrap_or(i32::MAX);
         Self { sec, nanosec: (stamp.nanos() % 1_000_000_000) as u32 }

@@ -1,11 +1,12 @@
-//! Messages of bumpers. Of some only the beginning is read, which is all that is used.
+//! Messages of bumpers. Of some types only the beginning is read, which contains all that is
+//! needed.
 
 use serde::{Deserialize, Serialize};
 
 use super::Header;
 
-/// `kobuki_ros_interfaces/BumperEvent`, and `kobuki_msgs/BumperEvent` of ROS 1: sent when one of the
-/// bumpers is pressed or released.
+/// `kobuki_ros_interfaces/BumperEvent`, and `kobuki_msgs/BumperEvent` of ROS 1: published when one
+/// of the bumpers is pressed or released.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BumperEvent {
     /// Number of the bumper.
@@ -41,7 +42,7 @@ pub struct HazardDetection {
 }
 
 impl HazardDetection {
-    /// Kind of a hazard that the bumper has touched.
+    /// Kind of the hazard that the bumper reports.
     pub const BUMP: u8 = 1;
 }
 

@@ -1,15 +1,15 @@
-//! Messages of types that are not part of this crate, read by the definition that comes with them in
-//! the log.
+//! Messages of types that are not part of this crate, read with the help of the definition that
+//! comes with them in the log.
 //!
-//! A definition is text, in the language of ROS 1 or ROS 2: the fields of the type, and behind each
-//! line of `=` those of a type that it contains. Only what is plain is read: numbers, texts, lists
-//! and types of these.
+//! A definition is text, in the language of ROS 1 or ROS 2: the fields of the type, then for each
+//! contained type a line of `=` and its fields. Only simple definitions are supported: numbers,
+//! strings, lists and types composed of these.
 
 use std::collections::BTreeMap;
 
 use super::ROS1_MARK;
 
-/// Types of a definition, by their names.
+/// Types of a definition, by name.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Definition {
     types: BTreeMap<String, Vec<Field>>,
@@ -35,7 +35,7 @@ enum Many {
 enum Kind {
     Number(Primitive),
     Text,
-    /// Two numbers of 32 bits, as ROS 1 has them.
+    /// Two numbers of 32 bits, as in ROS 1.
     Time,
     Type(String),
 }
@@ -57,7 +57,7 @@ enum Primitive {
 /// Value of a message.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Value {
-    /// Number of any type; a bool is 0 or 1.
+    /// Number of any type; a bool becomes 0 or 1.
     Number(f64),
     Text(String),
     List(Vec<Value>),
@@ -67,14 +67,14 @@ pub(crate) enum Value {
     Bytes,
 }
 
-/// Longest chain of types within types.
+/// Maximum nesting of types.
 const MOST_DEEP: usize = 16;
-/// Largest number of fields of all types of a definition.
+/// Maximum number of fields of all types of a definition.
 const MOST_FIELDS: usize = 4096;
-/// Largest number of values of a message.
+/// Maximum number of values of a message.
 const MOST_VALUES: usize = 1 << 18;
 
-/// Types that recorders leave out, because each log would have them.
+/// Types that recorders leave out, because every log would contain them.
 const WELL_KNOWN: [(&str, &str); 3] = [
     ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec"),
     ("builtin_interfaces/Duration", "int32 sec\nuint32 nanosec"),
@@ -82,10 +82,10 @@ const WELL_KNOWN: [(&str, &str); 3] = [
 ];
 
 impl Definition {
-    /// Reads the definition of a type, which is called as in the log (`package/msg/Name`).
+    /// Reads the definition of a type, whose name is written as in the log (`package/msg/Name`).
     ///
     /// # Errors
-    /// A line that is not plain, or a type that is missing.
+    /// A line that is not supported, or a type that is missing.
     pub(crate) fn parse(name: &str, text: &str) -> Result<Self, String> {
         let root = short_name(name);
         let mut types: BTreeMap<String, Vec<Field>> = BTreeMap::new();
@@ -119,7 +119,7 @@ impl Definition {
         Ok(found)
     }
 
-    /// Gives each field that names a type its full name.
+    /// Gives each field that has a message type its full name.
     fn resolve(&mut self) -> Result<(), String> {
         let names: Vec<String> = self.types.keys().cloned().collect();
         for (owner, fields) in &mut self.types {
@@ -139,8 +139,8 @@ impl Definition {
     /// Reads a message with its encapsulation header.
     ///
     /// # Errors
-    /// A message that does not have this layout. Bytes after it are an error, too, because then the
-    /// layout is another one; up to seven may pad.
+    /// A message that does not have this layout. Bytes after it are an error as well, because then
+    /// the layout is a different one; up to seven are accepted as padding.
     pub(crate) fn read(&self, message: &[u8]) -> Result<Value, String> {
         let (header, body) = message.split_at_checked(4).ok_or("it ends early")?;
         let order = match header {
@@ -174,7 +174,7 @@ impl Definition {
             Kind::Type(name) => {
                 let fields = self.types.get(name).ok_or_else(|| format!("no type `{name}`"))?;
                 if fields.is_empty() && reader.order != Order::Ros1 {
-                    // ROS 2 gives a type without fields one byte.
+                    // In ROS 2, a type without fields takes one byte.
                     reader.take(1)?;
                 }
                 let mut values = BTreeMap::new();
@@ -213,7 +213,7 @@ impl Value {
         })
     }
 
-    /// Returns the first of several fields that is there.
+    /// Returns the first of several fields that exists.
     pub(crate) fn any(&self, paths: &[&str]) -> Option<&Self> {
         paths.iter().find_map(|path| self.get(path))
     }
@@ -225,7 +225,7 @@ impl Value {
         }
     }
 
-    /// Returns a text, or a number as text.
+    /// Returns a string field, or a number as a string.
     pub(crate) fn text(&self, paths: &[&str]) -> Option<String> {
         match self.any(paths)? {
             Self::Text(text) => Some(text.clone()),
@@ -234,7 +234,7 @@ impl Value {
         }
     }
 
-    /// Returns the elements of a list; none if there is no such list.
+    /// Returns the elements of a list; empty if there is no such list.
     pub(crate) fn list(&self, path: &str) -> &[Self] {
         match self.get(path) {
             Some(Self::List(values)) => values,
@@ -243,7 +243,7 @@ impl Value {
     }
 }
 
-/// Returns a name without its middle part: `package/Name`.
+/// Returns a name without the middle part: `package/Name`.
 fn short_name(name: &str) -> String {
     let name = name.trim();
     match (name.split('/').next(), name.rsplit_once('/')) {
@@ -258,7 +258,7 @@ fn field(line: &str) -> Result<Option<Field>, String> {
     let (Some(kind), Some(name)) = (words.next(), words.next()) else {
         return Err(format!("`{line}` is no field"));
     };
-    // `uint8 X=1` and `uint8 X = 1`; what follows a name without it is a default.
+    // `uint8 X=1` and `uint8 X = 1`; anything else after a name is a default value.
     if name.contains('=') || words.next().is_some_and(|word| word.starts_with('=')) {
         return Ok(None);
     }
@@ -268,7 +268,7 @@ fn field(line: &str) -> Result<Option<Field>, String> {
             let count = count.trim_end_matches(']');
             let many = match count.parse() {
                 Ok(count) => Many::Fixed(count),
-                // Empty, or `<=` and a bound.
+                // Empty, or `<=` and an upper bound.
                 Err(_) => Many::List,
             };
             (kind, many)
@@ -305,7 +305,7 @@ struct Reader<'a> {
     body: &'a [u8],
     at: usize,
     order: Order,
-    /// Values that may still be read.
+    /// Number of values that may still be read.
     left: usize,
 }
 
@@ -352,7 +352,7 @@ impl<'a> Reader<'a> {
     fn text(&mut self) -> Result<String, String> {
         let length = self.length()?;
         let bytes = self.take(length)?;
-        // CDR counts a zero at the end.
+        // CDR includes a terminating zero in the length.
         let bytes = if self.order == Order::Ros1 {
             bytes
         } else {

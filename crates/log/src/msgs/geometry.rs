@@ -64,13 +64,13 @@ pub struct Transform {
     pub rotation: Quaternion,
 }
 
-/// Returns the isometry of a position and a rotation; `None` if a number is not finite or the
-/// length of the quaternion differs from 1 by 0.1 or more.
+/// Returns the isometry with this position and rotation; `None` if a number is not finite or the
+/// norm of the quaternion differs from 1 by 0.1 or more.
 fn isometry(position: Point, rotation: Quaternion) -> Option<Isometry3<f64>> {
     let q = nalgebra::Quaternion::new(rotation.w, rotation.x, rotation.y, rotation.z);
     let at = nalgebra::Vector3::new(position.x, position.y, position.z);
     let sane = at.iter().all(|v| v.is_finite()) && (q.norm() - 1.0).abs() < 0.1;
-    // Normalises the quaternion, which publishers round.
+    // Normalises the quaternion, because publishers round it.
     sane.then(|| Isometry3::from_parts(at.into(), UnitQuaternion::from_quaternion(q)))
 }
 

@@ -1,11 +1,11 @@
 //! ROS 2 messages that Tagalong reads and writes, in their CDR layout.
 //!
-//! The structs have the fields of the ROS definitions, in their order. CDR has no names: the order
-//! *is* the format. [`decode`] reads the encapsulation header and either byte order; [`encode`]
-//! writes little endian.
+//! The structs have the fields of the ROS definitions, in the same order. CDR has no field names:
+//! the order *is* the format. [`decode`] reads the encapsulation header and either byte order;
+//! [`encode`] writes little endian.
 //!
 //! Image payloads are borrowed from the message, so that decoding an image message costs no more
-//! than its header.
+//! than decoding its header.
 
 mod common;
 mod contact;
@@ -47,7 +47,7 @@ pub use vision::{
 pub trait Message {
     /// ROS name, for example `sensor_msgs/msg/Image`.
     const TYPE: &'static str;
-    /// Definition with all it contains, in the concatenated `ros2msg` form.
+    /// Definition including those of all contained types, in the concatenated `ros2msg` form.
     const DEFINITION: &'static str;
 }
 
@@ -61,11 +61,11 @@ macro_rules! message {
 }
 use message;
 
-/// Reason for which a message could not be read.
+/// Reason why a message could not be read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CdrError {
-    /// The encapsulation header is missing, or of another representation than plain CDR.
+    /// The encapsulation header is missing, or is not that of plain CDR.
     #[error("not a CDR message: it starts with {0:02x?}; expected 00 00 or 00 01")]
     Encapsulation(Vec<u8>),
     /// The bytes end early or do not fit the type.
@@ -73,15 +73,15 @@ pub enum CdrError {
     Content(String),
 }
 
-/// Bytes in the place of an encapsulation header of CDR, in front of a message that is serialised as
-/// ROS 1 does.
+/// Bytes that replace the encapsulation header of CDR in front of a message that is serialised as
+/// in ROS 1.
 pub(crate) const ROS1_MARK: [u8; 4] = *b"ros1";
 
 /// Reads a message with its four-byte encapsulation header, or one of a ROS 1 bag as
 /// [`crate::LogWalker`] delivers it.
 ///
 /// # Errors
-/// [`CdrError`]. Bytes after the message are allowed, because some writers pad.
+/// [`CdrError`]. Bytes after the message are allowed, because some writers add padding.
 ///
 /// ```
 /// use tagalong_log::msgs::{StringMsg, decode, encode};

@@ -1,4 +1,4 @@
-//! People as planners that keep a distance from them read them (`people_msgs`).
+//! People in the messages of planners that keep a distance from them (`people_msgs`).
 
 use serde::{Deserialize, Serialize};
 
@@ -13,7 +13,7 @@ pub struct PersonMsg {
     pub position: Point,
     /// Velocity, m/s.
     pub velocity: Point,
-    /// Certainty that the person is there, 0 to 1.
+    /// Probability that the person exists, 0 to 1.
     pub reliability: f64,
     /// Names of further properties.
     pub tagnames: Vec<String>,

@@ -1,5 +1,5 @@
-//! Messages as ROS 1 serialises them: little endian, without alignment, lists and texts with their
-//! length in front, and a sequence number at the start of each header.
+//! Messages as ROS 1 serialises them: little endian, without alignment, lists and strings preceded
+//! by their length, and a sequence number at the start of each header.
 
 use std::fmt::Display;
 
@@ -8,7 +8,7 @@ use serde::de::{
 };
 use serde::{Deserialize, forward_to_deserialize_any};
 
-/// Reads a message without any header in front; bytes after it are allowed.
+/// Reads a message that has no encapsulation header; bytes after it are allowed.
 pub(super) fn from_bytes<'de, T: Deserialize<'de>>(bytes: &'de [u8]) -> Result<T, String> {
     T::deserialize(&mut Ros1 { rest: bytes }).map_err(|error| error.0)
 }
@@ -156,7 +156,7 @@ impl<'de> Deserializer<'de> for &mut Ros1<'de> {
         visitor: V,
     ) -> Result<V::Value, Misfit> {
         if name == "Header" {
-            // The sequence number, which ROS 2 has not.
+            // The sequence number, which ROS 2 does not have.
             self.take(4)?;
         }
         self.deserialize_tuple(fields.len(), visitor)

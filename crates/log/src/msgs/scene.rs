@@ -1,11 +1,11 @@
-//! Messages that viewers draw by themselves: markers for RViz and Foxglove, scenes and annotations
-//! of images for Foxglove. Fields that are never filled have the type of an empty list.
+//! Messages for visualisation: markers for RViz and Foxglove, scenes and image annotations for
+//! Foxglove. Fields that are never filled have the type of an empty list.
 
 use serde::{Deserialize, Serialize};
 
 use super::{Header, Point, Pose, Time, Vector3, message};
 
-/// List without items, whatever their type: CDR writes its length alone.
+/// Empty list of any type: CDR writes only its length.
 pub type Empty = Vec<u8>;
 
 /// `builtin_interfaces/Duration`, with the layout of a [`Time`].
@@ -55,7 +55,7 @@ pub struct Marker {
     pub header: Header,
     /// Namespace of the id.
     pub ns: String,
-    /// Identity: a later marker replaces the earlier one.
+    /// ID: a later marker replaces an earlier one.
     pub id: i32,
     /// Shape: [`Marker::ARROW`] and so on.
     pub shape: i32,
@@ -67,9 +67,9 @@ pub struct Marker {
     pub scale: Vector3,
     /// Colour.
     pub color: ColorRgba,
-    /// Time until it goes by itself; 0 is never.
+    /// Time after which the marker disappears; 0 for never.
     pub lifetime: Duration,
-    /// True if it moves with its frame.
+    /// True if the marker moves with its frame.
     pub frame_locked: bool,
     /// Tail and tip of an arrow, or the ends of lines.
     pub points: Vec<Point>,
@@ -98,7 +98,7 @@ impl Marker {
     pub const ARROW: i32 = 0;
     /// Upright cylinder.
     pub const CYLINDER: i32 = 3;
-    /// Lines, each from a point to the next one of a pair.
+    /// Lines between pairs of points.
     pub const LINE_LIST: i32 = 5;
     /// Text that faces the viewer.
     pub const TEXT: i32 = 9;
@@ -124,7 +124,7 @@ pub struct SceneEntityDeletion {
     pub timestamp: Time,
     /// 0 removes the entity with the id, 1 all.
     pub extent: u8,
-    /// Identity of the entity.
+    /// ID of the entity.
     pub id: String,
 }
 
@@ -168,7 +168,7 @@ pub struct CylinderPrimitive {
 /// `foxglove_msgs/LinePrimitive`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LinePrimitive {
-    /// 2 for lines, each from a point to the next one of a pair.
+    /// 2 for lines between pairs of points.
     pub shape: u8,
     /// Pose of the origin of the points.
     pub pose: Pose,
@@ -187,7 +187,7 @@ pub struct LinePrimitive {
 }
 
 impl LinePrimitive {
-    /// Shape of lines, each from a point to the next one of a pair.
+    /// Shape of lines between pairs of points.
     pub const LINE_LIST: u8 = 2;
 }
 
@@ -215,13 +215,13 @@ pub struct SceneEntity {
     pub timestamp: Time,
     /// Frame.
     pub frame_id: String,
-    /// Identity: a later entity replaces the earlier one.
+    /// ID: a later entity replaces an earlier one.
     pub id: String,
-    /// Time until it goes by itself; 0 is never.
+    /// Time after which the entity disappears; 0 for never.
     pub lifetime: Duration,
-    /// True if it moves with its frame.
+    /// True if the entity moves with its frame.
     pub frame_locked: bool,
-    /// Further facts.
+    /// Metadata.
     pub metadata: Empty,
     /// Arrows.
     pub arrows: Vec<ArrowPrimitive>,

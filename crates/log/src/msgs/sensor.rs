@@ -25,8 +25,8 @@ pub struct Image<'a> {
 }
 
 impl<'a> Image<'a> {
-    /// Returns an image of `width` columns and `height` rows, which lie one behind the other without
-    /// bytes between them; values of more than one byte have the low byte first.
+    /// Returns an image of `width` columns and `height` rows, without padding between the rows;
+    /// values of more than one byte have the low byte first.
     pub fn packed(header: Header, encoding: &str, width: u32, height: u32, data: &'a [u8]) -> Self {
         let step = (data.len() as u32).checked_div(height).unwrap_or(0);
         Self { header, height, width, encoding: encoding.to_owned(), is_bigendian: 0, step, data }
@@ -61,9 +61,9 @@ pub struct DisparityImage<'a> {
     pub f: f32,
     /// Baseline, m.
     pub t: f32,
-    /// Part of the image that may have disparities; 0 by 0 is all of it.
+    /// Part of the image that may have disparities; 0 by 0 means the whole image.
     pub valid_window: RegionOfInterest,
-    /// Minimum of the range that was searched, pixels; less is invalid.
+    /// Minimum of the range that was searched, pixels; lower values are invalid.
     pub min_disparity: f32,
     /// Maximum of the range that was searched, pixels.
     pub max_disparity: f32,
@@ -80,11 +80,11 @@ pub struct RegionOfInterest {
     pub x_offset: u32,
     /// First row.
     pub y_offset: u32,
-    /// Number of rows; 0 together with a width of 0 is the full image.
+    /// Number of rows; 0 together with a width of 0 means the full image.
     pub height: u32,
     /// Number of columns.
     pub width: u32,
-    /// True if the region is to be rectified; without a meaning for this image.
+    /// True if the region is to be rectified; not used for this image.
     pub do_rectify: bool,
 }
 
@@ -144,10 +144,10 @@ pub struct LaserScan {
 
 message!(LaserScan, "sensor_msgs/msg/LaserScan", "LaserScan.msg");
 
-/// `sensor_msgs/Range`. Newer versions have a variance behind the last field, which is not used.
+/// `sensor_msgs/Range`. Newer versions have a variance after the last field, which is not used.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Range {
-    /// Time, and the sensor, which looks along its X axis.
+    /// Time and frame of the sensor, which measures along its X axis.
     pub header: Header,
     /// 0 for ultrasound, 1 for infrared.
     pub radiation_type: u8,
@@ -157,8 +157,8 @@ pub struct Range {
     pub min_range: f32,
     /// Maximum range that is measured, m.
     pub max_range: f32,
-    /// The range, m; infinite for no reflection, and minus infinite for one below the minimum (REP
-    /// 117).
+    /// The range, m; infinity for no reflection, and minus infinity for a surface nearer than the
+    /// minimum (REP 117).
     pub range: f32,
 }
 
@@ -193,7 +193,7 @@ message!(JointState, "sensor_msgs/msg/JointState", "JointState.msg");
 pub struct PointCloud2<'a> {
     /// Time and frame.
     pub header: Header,
-    /// Number of rows; 1 for points without an order.
+    /// Number of rows; 1 for an unorganised cloud.
     pub height: u32,
     /// Number of points of a row.
     pub width: u32,
@@ -240,7 +240,7 @@ impl PointCloud2<'_> {
 pub struct PointField {
     /// Name, for example `x`.
     pub name: String,
-    /// Number of bytes before it in a point.
+    /// Offset of the field in a point, bytes.
     pub offset: u32,
     /// Type of its values.
     pub datatype: u8,

@@ -1,10 +1,10 @@
-//! Packets of video.
+//! Video packets.
 
 use serde::{Deserialize, Serialize};
 
 use super::{Header, Time, message};
 
-/// `foxglove_msgs/CompressedVideo`: the packet of one picture, without pictures between two others.
+/// `foxglove_msgs/CompressedVideo`: the packet of one picture, without B-frames.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CompressedVideo<'a> {
     /// Time of the picture.

@@ -38,7 +38,7 @@ pub struct Detection3D {
     pub results: Vec<ObjectHypothesisWithPose>,
     /// Bounding box.
     pub bbox: BoundingBox3D,
-    /// Identity over time.
+    /// ID over time.
     pub id: String,
 }
 
@@ -47,7 +47,7 @@ pub struct Detection3D {
 pub struct Detection3DArray {
     /// Time and frame.
     pub header: Header,
-    /// All detections of one time.
+    /// All detections of one moment.
     pub detections: Vec<Detection3D>,
 }
 
@@ -89,7 +89,7 @@ pub struct Detection2D {
     pub results: Vec<ObjectHypothesisWithPose>,
     /// Bounding box in the image.
     pub bbox: BoundingBox2D,
-    /// Identity over time.
+    /// ID over time.
     pub id: String,
 }
 
@@ -98,7 +98,7 @@ pub struct Detection2D {
 pub struct Detection2DArray {
     /// Time and image.
     pub header: Header,
-    /// All detections of one time.
+    /// All detections of one moment.
     pub detections: Vec<Detection2D>,
 }
 

@@ -1,4 +1,4 @@
-//! Messages of bumpers, and what is left of them between two messages.
+//! Messages of bumpers, and their state between two messages.
 
 use std::collections::BTreeSet;
 
@@ -23,8 +23,8 @@ const TYPES: [(&str, Contact); 8] = [
     ("ros_ign_interfaces/Contacts", Contact::Fleeting),
 ];
 
-/// Time after which a contact that is not repeated is over, where messages come during a contact
-/// only, s.
+/// Time after which a contact counts as ended if it is not repeated, for types that are published
+/// only during a contact, s.
 const FLEETING_S: f64 = 0.5;
 
 /// Meaning of the messages of a bumper.
@@ -32,15 +32,15 @@ const FLEETING_S: f64 = 0.5;
 pub(super) enum Contact {
     /// True while it is pressed.
     Bool,
-    /// Each press and each release of one of several bumpers.
+    /// Published at each press and each release of one of several bumpers.
     Event,
-    /// All hazards of a base, again and again.
+    /// All hazards of a base, published periodically.
     Hazards,
-    /// The state of a base, again and again.
+    /// The state of a base, published periodically.
     State,
-    /// All contacts, again and again, also if there are none.
+    /// All contacts, published periodically, even if there are none.
     Contacts,
-    /// All contacts as long as there are any.
+    /// All contacts, published only while there are any.
     Fleeting,
 }
 
@@ -50,27 +50,27 @@ impl Contact {
         TYPES.iter().find(|(name, _)| is_type(schema, name)).map(|(_, contact)| *contact)
     }
 
-    /// Returns the message types in words.
+    /// Returns the names of the message types as text.
     pub(super) fn type_names() -> String {
         let names: Vec<&str> = TYPES.iter().map(|(name, _)| *name).collect();
         names.join(", ")
     }
 
-    /// Returns true if a bumper that says nothing is not pressed, so that silence does not make its
-    /// reading old.
+    /// Returns true if a bumper publishes nothing while it is not pressed, so that its reading does
+    /// not age when it is silent.
     pub(super) fn may_be_silent(self) -> bool {
         matches!(self, Self::Event | Self::Fleeting)
     }
 }
 
-/// State of the bumpers of a topic.
+/// State of the bumpers on a topic.
 #[derive(Debug)]
 pub(super) struct Bumper {
     contact: Contact,
-    /// Bumpers that are pressed, by the events so far.
+    /// Bumpers that are pressed according to the events so far.
     pressed: BTreeSet<u8>,
     readings: Readings<bool>,
-    /// Number of the last reading that a frame has had.
+    /// Index of the last reading that was delivered with a frame.
     delivered: u64,
 }
 
@@ -79,7 +79,7 @@ impl Bumper {
         Self { contact, pressed: BTreeSet::new(), readings: Readings::default(), delivered: 0 }
     }
 
-    /// Takes in a message, which has the stamp of its arrival if it has none of its own.
+    /// Adds a message. If it has no stamp of its own, its arrival is the stamp.
     pub(super) fn take(&mut self, data: &[u8], arrival: Stamp) -> Result<(), CdrError> {
         let (stamp, is_pressed) = match self.contact {
             Contact::Bool => (arrival, decode::<BoolMsg>(data)?.data),
@@ -102,7 +102,7 @@ impl Bumper {
         Ok(())
     }
 
-    /// Returns true if any bumper is pressed after an event.
+    /// Returns true if any bumper is pressed after this event.
     fn after(&mut self, event: BumperEvent) -> bool {
         if event.state == BumperEvent::RELEASED {
             self.pressed.remove(&event.bumper);
@@ -112,8 +112,8 @@ impl Bumper {
         !self.pressed.is_empty()
     }
 
-    /// Returns the state at a frame, with the time of the reading; `None` without one. A press since
-    /// the last frame counts, also if it is over.
+    /// Returns the state at a frame, with the time of the reading; `None` without one. A press
+    /// since the last frame counts even if it has ended.
     pub(super) fn state(&mut self, frame: Stamp, latest: Stamp) -> Option<(Stamp, bool)> {
         let mut was_pressed = false;
         let mut delivered = self.delivered;
@@ -129,7 +129,7 @@ impl Bumper {
         }
         let Some((stamp, is_pressed)) = found else { return Some((frame, false)) };
         let is_over = self.contact == Contact::Fleeting && frame.seconds_since(stamp) > FLEETING_S;
-        // The state holds until the next message.
+        // The state is valid until the next message.
         Some((frame, is_pressed && !is_over))
     }
 

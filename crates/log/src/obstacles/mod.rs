@@ -1,8 +1,8 @@
-//! Further sources of obstacles: topics beside those that make the frames.
+//! Further obstacle sources: topics other than those from which the frames are made.
 //!
-//! A reader keeps the newest readings of its topic, and gives the newest one with each frame, moved to
-//! where the robot is at the time of the frame. A source that falls silent keeps its last reading,
-//! which grows old.
+//! A reader keeps the newest readings of its topic. Each frame gets the newest one, transformed to
+//! the pose of the robot at the time of the frame. A source that falls silent keeps its last
+//! reading, whose age increases.
 
 mod bumper;
 mod plan;
@@ -14,7 +14,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 pub(crate) use self::plan::{PlannedSource, planned_sources};
 pub(crate) use self::reader::{DepthFormat, ObstacleReader};
 
-/// Topic of a further source of obstacles, a `[[collision_monitor.sources]]` section of a config.
+/// Topic of a further obstacle source: a `[[collision_monitor.sources]]` section of a config.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObstacleTopic {
     /// Name of the source.
@@ -25,12 +25,12 @@ pub struct ObstacleTopic {
     pub topic: String,
     /// Topic of the calibration of a depth camera; `None` to find it beside `topic`.
     pub info_topic: Option<String>,
-    /// Pose of the sensor in the robot frame: x, y, z in m, roll, pitch, yaw in degrees; it looks
-    /// along its x axis, a camera too. `None` for the pose of tf.
+    /// Pose of the sensor in the robot frame: x, y, z in m, roll, pitch, yaw in degrees. The sensor
+    /// looks along its x axis, even if it is a camera. `None` to take the pose from tf.
     pub mount: Option<[f64; 6]>,
 }
 
-/// Kind of a source of obstacles.
+/// Kind of an obstacle source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ObstacleKind {
@@ -40,17 +40,17 @@ pub enum ObstacleKind {
     Depth,
     /// `sensor_msgs/Range`.
     Range,
-    /// A contact message: `std_msgs/Bool`, or that of a common base or simulator.
+    /// A contact message: `std_msgs/Bool`, or one of those of common bases or simulators.
     Bumper,
 }
 
 impl ObstacleTopic {
-    /// Creates a source whose pose is that of tf.
+    /// Creates a source whose pose comes from tf.
     pub fn new(name: &str, kind: ObstacleKind, topic: &str) -> Self {
         Self { name: name.to_owned(), kind, topic: topic.to_owned(), info_topic: None, mount: None }
     }
 
-    /// Returns the pose of the sensor in the robot frame that the settings give.
+    /// Returns the pose of the sensor in the robot frame, if the settings give it.
     fn robot_from_sensor(&self) -> Option<Isometry3<f64>> {
         let [x, y, z, roll, pitch, yaw] = self.mount?;
         let [roll, pitch, yaw] = [roll, pitch, yaw].map(f64::to_radians);
@@ -63,7 +63,8 @@ impl ObstacleTopic {
     }
 }
 
-/// Returns the pose of a camera that looks along the x axis: its own axes are right, down and ahead.
+/// Returns the pose of a camera that looks along the x axis: the camera's own axes are right, down
+/// and forward.
 fn level_camera() -> Isometry3<f64> {
     let quarter = std::f64::consts::FRAC_PI_2;
     let turn = UnitQuaternion::from_euler_angles(-quarter, 0.0, -quarter);

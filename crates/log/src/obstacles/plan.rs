@@ -1,4 +1,4 @@
-//! Sources of obstacles that a log or a robot has.
+//! Selection of the obstacle sources that a log or a robot has.
 
 use tagalong_math::counted;
 
@@ -11,7 +11,7 @@ use crate::tally::Tally;
 use crate::topics::{calibration_of, kind_of, missing};
 use crate::{InputSettings, LogError};
 
-/// Source whose topic is there.
+/// Source whose topic was found.
 #[derive(Clone, Debug)]
 pub(crate) struct PlannedSource {
     pub(crate) topic: ObstacleTopic,
@@ -22,7 +22,7 @@ pub(crate) struct PlannedSource {
 }
 
 impl ObstacleKind {
-    /// Returns true for messages of the kind, in an encoding that can be read.
+    /// Returns true for messages of this kind in an encoding that can be read.
     fn reads(self, topic: &Topic) -> bool {
         let is_readable = matches!(topic.encoding.as_str(), "cdr" | "ros1");
         is_readable
@@ -34,7 +34,7 @@ impl ObstacleKind {
             }
     }
 
-    /// Returns the message types in words.
+    /// Returns the names of the message types as text.
     fn type_names(self) -> String {
         match self {
             Self::Scan => "sensor_msgs/LaserScan".to_owned(),
@@ -45,19 +45,19 @@ impl ObstacleKind {
     }
 }
 
-/// Returns the sources of the settings that are there. One that a log lacks is told and left out, so
-/// that it never delivers; a robot is waited for.
+/// Returns the sources in the settings that exist. A source that a log lacks is reported and left
+/// out, so that it never delivers a reading; on a robot its topic is waited for.
 ///
 /// # Errors
 /// A topic of another type, a calibration that cannot be used, and on a robot a source that has not
-/// delivered.
+/// yet delivered a reading.
 pub(crate) fn planned_sources(
     scan: &Scan,
     input: &InputSettings,
     tally: &mut Tally,
 ) -> Result<Vec<PlannedSource>, LogError> {
     let mut planned = Vec::new();
-    // Without a topic, a program fills the frames itself.
+    // Sources without a topic are filled by a program.
     for source in input.sources.iter().filter(|source| !source.topic.is_empty()) {
         match planned_source(scan, source)? {
             Planned::Found(found) => planned.push(*found),
@@ -79,7 +79,7 @@ enum Planned {
     Lacks { wanted: String, remedy: String },
 }
 
-/// Looks for the topic of a source, and for the calibration of a depth camera.
+/// Looks for the topic of a source, and for the calibration if it is a depth camera.
 fn planned_source(scan: &Scan, source: &ObstacleTopic) -> Result<Planned, LogError> {
     let ObstacleTopic { name, kind, topic, .. } = source;
     let found = scan.topics.get(topic);
@@ -105,7 +105,7 @@ fn planned_source(scan: &Scan, source: &ObstacleTopic) -> Result<Planned, LogErr
     Ok(Planned::Found(Box::new(PlannedSource { topic: source.clone(), schema, lens })))
 }
 
-/// Returns true for a bumper of which silence says that it is not pressed.
+/// Returns true for a bumper whose silence means that it is not pressed.
 fn may_be_silent(topic: &Topic) -> bool {
     Contact::of(&topic.schema).is_some_and(Contact::may_be_silent)
 }
@@ -132,7 +132,7 @@ fn lens_of(scan: &Scan, source: &ObstacleTopic) -> Result<Option<Intrinsics>, Lo
         return Ok(None);
     };
     let Some(info) = scan.infos.get(&topic) else { return Ok(None) };
-    // The name of the topic is the only sign that images are rectified.
+    // The topic name is the only indication that images are rectified.
     intrinsics(info, source.topic.contains("rect"))
         .map(Some)
         .map_err(|source| LogError::Calibration { path: scan.path.clone(), topic, source })

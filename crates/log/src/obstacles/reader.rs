@@ -1,4 +1,5 @@
-//! Readers of the sources: from messages to readings where the robot is at the time of a frame.
+//! Readers of the sources: they convert messages to readings at the pose of the robot at the time
+//! of a frame.
 
 use std::sync::Arc;
 
@@ -26,11 +27,11 @@ pub(crate) struct ObstacleReader {
     source: ObstacleTopic,
     name: Arc<str>,
     messages: Messages,
-    /// Time by which a reading may be later than the frame that it is used for, s.
+    /// Time by which a reading may be later than its frame, s.
     later_s: f64,
 }
 
-/// Messages of a source that are kept.
+/// Stored messages of a source.
 enum Messages {
     Scan(Readings<LaserScan>),
     Range(Readings<Range>),
@@ -38,29 +39,29 @@ enum Messages {
     Bumper(Bumper),
 }
 
-/// Depth images of a camera, of which the newest is decoded.
+/// Depth images of a camera; only the newest is decoded.
 struct DepthMessages {
     kind: Type,
     lens: Intrinsics,
     images: Readings<Payload>,
-    /// Last decoded image with its number; `None` for one that is damaged.
+    /// Last decoded image with its index; `None` for a damaged one.
     decoded: Option<(u64, Option<Arc<DepthImage>>)>,
 }
 
-/// Settings for the decoding of depth images.
+/// Settings for decoding depth images.
 #[derive(Clone, Copy)]
 pub(crate) struct DepthFormat<'a> {
-    /// Metres per unit, if it is not that of the encoding.
+    /// Metres per unit, if it differs from that of the encoding.
     pub(crate) unit_m: Option<f64>,
-    /// Largest sizes.
+    /// Maximum sizes.
     pub(crate) limits: &'a Limits,
 }
 
 impl ObstacleReader {
     /// Creates the reader of a source; `None` for a planned source that lacks a part.
     ///
-    /// On a robot all readings that have come count, also those of after the frame, whose images take
-    /// their time. A log is read ahead, so there only those of before the frame do.
+    /// On a robot all readings that have arrived count, even those later than the frame, because
+    /// images take time to process. A log is read ahead, so only readings before the frame count.
     pub(crate) fn new(planned: &PlannedSource, is_live: bool) -> Option<Self> {
         let later_s = if is_live { AHEAD_S } else { 0.0 };
         let PlannedSource { topic: source, schema, lens } = planned;
@@ -79,12 +80,12 @@ impl ObstacleReader {
         Some(Self { source: source.clone(), name, messages, later_s })
     }
 
-    /// Returns the topic that is read.
+    /// Returns the topic of the source.
     pub(crate) fn topic(&self) -> &str {
         &self.source.topic
     }
 
-    /// Takes in a message, which has the stamp of its arrival if it has none of its own.
+    /// Adds a message. If it has no stamp of its own, its arrival is the stamp.
     ///
     /// # Errors
     /// A message that cannot be decoded.
@@ -126,7 +127,8 @@ impl ObstacleReader {
         Ok(())
     }
 
-    /// Returns the newest reading for a frame; `None` without one, or without the pose of the sensor.
+    /// Returns the newest reading for a frame; `None` without one, or if the pose of the sensor is
+    /// unknown.
     pub(crate) fn reading(
         &mut self,
         moment: &Moment<'_>,
@@ -167,12 +169,12 @@ impl ObstacleReader {
                 (stamp, ObstacleData::Depth { image, camera: Arc::new(camera) })
             }
         };
-        // A reading of after the frame is as new as it can be.
+        // A reading later than the frame has age 0.
         let age_s = moment.stamp.seconds_since(stamp).max(0.0);
         Some(ObstacleReading::new(Arc::clone(&self.name), stamp, age_s, data))
     }
 
-    /// Counts a frame for which the source has readings of far later times alone.
+    /// Counts a frame for which the source only has readings of much later times.
     fn note_ahead(&self, moment: &Moment<'_>, tally: &mut Tally) {
         let first = match &self.messages {
             Messages::Scan(scans) => scans.first_stamp(),
@@ -205,7 +207,7 @@ impl DepthMessages {
     ) -> Option<(Stamp, String, Arc<DepthImage>)> {
         let Self { kind, lens, images, decoded } = self;
         let newest = images.newest_until(latest)?;
-        // Frames may come more often than the images of another camera.
+        // Frames may be more frequent than the images of another camera.
         if decoded.as_ref().is_none_or(|(number, _)| *number != newest.number) {
             let image = depth_of(*kind, &newest.value, format).and_then(|image| {
                 let size = check_size(lens, image.width(), image.height());
@@ -240,7 +242,7 @@ fn depth_of(
     match pixels? {
         Pixels::Depth(depth) => Ok(depth),
         Pixels::Colour(_) | Pixels::Grey(_) => {
-            Err(ImageError::Codec("the pixels are a picture and no depth".to_owned()))
+            Err(ImageError::Codec("the pixels are a picture, not depth".to_owned()))
         }
     }
 }
@@ -249,8 +251,8 @@ fn undecodable(error: CdrError) -> ImageError {
     ImageError::Codec(error.to_string())
 }
 
-/// Returns the pose of a sensor on the robot: that of the settings, else that of tf at the time of the
-/// reading. An unknown one is counted.
+/// Returns the pose of a sensor on the robot: from the settings, or otherwise from tf at the time
+/// of the reading. An unknown pose is counted.
 fn mount_at(
     source: &ObstacleTopic,
     moment: &Moment<'_>,
@@ -272,7 +274,7 @@ fn mount_at(
     found
 }
 
-/// Returns false for a range without a cone or limits.
+/// Returns false for a range whose cone or limits are impossible.
 fn is_possible(range: &Range) -> bool {
     let limits = range.min_range..=range.max_range;
     let cone = 0.0..=std::f32::consts::TAU;
@@ -283,7 +285,7 @@ fn is_possible(range: &Range) -> bool {
 }
 
 fn range_reading(range: &Range, robot_from_sensor: Isometry3<f64>) -> RangeReading {
-    // REP 117: minus infinity is a surface nearer than the sensor measures.
+    // REP 117: minus infinity means a surface nearer than the minimum range.
     let is_too_near = range.range == f32::NEG_INFINITY;
     RangeReading {
         robot_from_sensor,

@@ -4,25 +4,25 @@ use tagalong_core::Stamp;
 
 /// Step back of the clock beyond which it has jumped, s.
 const CLOCK_JUMP_S: f64 = 1.0;
-/// Maximum number of readings kept.
+/// Maximum number of stored readings.
 const MAX_READINGS: usize = 1024;
-/// Maximum number of bytes kept, unless a few readings alone are larger.
+/// Maximum number of stored bytes, unless a few readings alone exceed it.
 const MAX_BYTES: usize = 40 << 20;
-/// Number of readings that are kept regardless of their size.
+/// Number of readings that are stored whatever their size.
 const MIN_READINGS: usize = 4;
 
 /// Reading of a source with its time.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Timed<T> {
     pub(super) stamp: Stamp,
-    /// Place in the order of arrival, from 1.
+    /// Index in the order of arrival, from 1.
     pub(super) number: u64,
-    /// Size in memory.
+    /// Size in memory, bytes.
     bytes: usize,
     pub(super) value: T,
 }
 
-/// Newest readings of a source, in the order of their stamps.
+/// Newest readings of a source, sorted by stamp.
 #[derive(Debug)]
 pub(super) struct Readings<T> {
     readings: VecDeque<Timed<T>>,
@@ -37,7 +37,7 @@ impl<T> Default for Readings<T> {
 }
 
 impl<T> Readings<T> {
-    /// Adds a reading. After a jump back of the clock the old ones are removed.
+    /// Adds a reading. If the clock has jumped back, the old readings are removed.
     pub(super) fn push(&mut self, stamp: Stamp, bytes: usize, value: T) {
         let newest = self.readings.back().map_or(stamp, |newest| newest.stamp);
         if newest.seconds_since(stamp) > CLOCK_JUMP_S {
@@ -46,7 +46,7 @@ impl<T> Readings<T> {
         }
         self.arrived += 1;
         self.bytes += bytes;
-        // Behind those of the same stamp, so that the newest is the last to arrive.
+        // Inserted after those of the same stamp, so that the last to arrive counts as the newest.
         let place = self.readings.partition_point(|old| old.stamp <= stamp);
         self.readings.insert(place, Timed { stamp, number: self.arrived, bytes, value });
         while self.is_overfull() {
@@ -64,12 +64,12 @@ impl<T> Readings<T> {
         self.bytes -= bytes;
     }
 
-    /// Yields the readings up to a time.
+    /// Yields the readings up to this time.
     pub(super) fn until(&self, latest: Stamp) -> impl Iterator<Item = &Timed<T>> {
         self.readings.iter().take_while(move |reading| reading.stamp <= latest)
     }
 
-    /// Returns the newest reading up to a time, and drops those before it.
+    /// Returns the newest reading up to this time, and drops those before it.
     pub(super) fn newest_until(&mut self, latest: Stamp) -> Option<&Timed<T>> {
         let count = self.until(latest).count();
         (1..count).for_each(|_| self.drop_oldest());

@@ -1,5 +1,5 @@
-//! Meaning of recorded boxes: the numbers of some detectors are something else than middle and size in
-//! pixels of the image, and a probability, which their values tell.
+//! Check of the layout of recorded boxes: some detectors write something other than centre and size
+//! in pixels, and a probability. The values show it.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -7,54 +7,54 @@ use tagalong_geometry::{Camera, Rect};
 
 use crate::tally::Tally;
 
-/// Number of boxes below which nothing is told.
+/// Minimum number of boxes for this check.
 const LEAST_BOXES: u64 = 5;
-/// Share of the boxes that fit into the image where the layout is another one.
+/// Maximum fraction of the boxes that fit into the image if their layout is wrong.
 const FEW: f64 = 0.5;
-/// Share of the boxes that fit into the image where the layout is right.
+/// Minimum fraction of the boxes that fit into the image if their layout is right.
 const MOST: f64 = 0.9;
-/// Part of a side of the image by which boxes may stick out of it.
+/// Fraction of a side of the image by which boxes may extend beyond it.
 const MARGIN: f64 = 0.1;
-/// Least deviation of the columns of middles, as a part of the width of the image, by which motion tells
-/// corners.
+/// Minimum standard deviation of the columns of centres, as a fraction of the image width, from
+/// which motion can reveal corners.
 const LEAST_MOTION: f64 = 0.02;
-/// Part of that deviation below which the width follows the column: that of a second corner does so, and a
-/// width does not.
+/// Fraction of that deviation below which the width follows the column: that of a second corner
+/// does so, but a real width does not.
 const FOLLOWS: f64 = 0.5;
-/// Ratio of width to height from which on a box is wide. Standing people are higher than wide.
+/// Ratio of width to height from which on a box is wide. Standing people are taller than wide.
 const WIDE: f64 = 1.5;
 
-/// Boxes of people in images, as far as they were read.
+/// Statistics of the boxes of people in images that were read so far.
 #[derive(Default)]
 pub(super) struct BoxLayout(Mutex<Seen>);
 
 #[derive(Default)]
 struct Seen {
     boxes: u64,
-    /// Number of boxes that fit as they are, with x and y exchanged, and as two corners.
+    /// Numbers of boxes that fit as they are, with x and y exchanged, and as two corners.
     fit: u64,
     fit_exchanged: u64,
     fit_corners: u64,
     wide: u64,
-    /// Column of the rightmost middle, pixels.
+    /// Column of the rightmost centre, pixels.
     rightmost: f64,
-    /// Sums and sums of squares, by which deviations are known: of the columns of middles, and of the widths
-    /// less those columns, pixels.
+    /// Sums and sums of squares, from which deviations are computed: of the columns of centres, and
+    /// of the widths minus those columns, pixels.
     columns: [f64; 2],
     rests: [f64; 2],
-    /// Number of boxes whose middle is outside of the image.
+    /// Number of boxes whose centre is outside of the image.
     outside: u64,
-    /// Columns and rows of the image, and the farthest right and lower ends of the boxes, pixels.
+    /// Columns and rows of the image, and the farthest right and lower edges of the boxes, pixels.
     image: [f64; 2],
     reach: [f64; 2],
-    /// Least and greatest score.
+    /// Lowest and highest score.
     scores: Option<[f64; 2]>,
 }
 
 impl BoxLayout {
-    /// Takes in a box with its score.
+    /// Adds a box with its score.
     pub(super) fn take(&self, region: &Rect, score: f64, camera: &Camera) {
-        // The images of a mirror are unwrapped, and boxes may be those of the raw ones.
+        // Images of a mirror are unwrapped, but the boxes may be those of the raw images.
         if camera.is_blind() || camera.panorama().is_some() {
             return;
         }
@@ -64,7 +64,7 @@ impl BoxLayout {
         seen.scores = Some([least.min(score), most.max(score)]);
     }
 
-    /// Tells at the end of a log if the boxes have another layout.
+    /// Reports at the end of a log if the boxes have another layout.
     pub(super) fn close(&self, topic: &str, tally: &mut Tally) {
         let seen = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(why) = seen.misplaced() {
@@ -76,8 +76,9 @@ impl BoxLayout {
             && (least < 0.0 || most > 1.0)
         {
             tally.note(format!(
-                "{topic}: scores from {least:.2} to {most:.2} are no probabilities: let the detector \
-                 write 0 to 1; margins are taken with `score = \"log-odds\"` of recorded-detections"
+                "{topic}: scores from {least:.2} to {most:.2} are no probabilities: let the \
+                 detector write 0 to 1; log-odds need `score = \"log-odds\"` of \
+                 recorded-detections"
             ));
         }
     }
@@ -99,7 +100,7 @@ impl Seen {
         self.wide += u64::from(width > WIDE * height);
         self.fit += u64::from(fits(region, image));
         self.fit_exchanged += u64::from(fits(&Rect::new(y, x, height, width), image));
-        // Middle and size are the first and the second corner.
+        // Interprets centre and size as the first and the second corner.
         let corners = Rect::new(across, down, width - across, height - down);
         let has_size = corners.width > 0.0 && corners.height > 0.0;
         self.fit_corners += u64::from(has_size && fits(&corners, image));
@@ -109,20 +110,20 @@ impl Seen {
         count as f64 >= MOST * self.boxes as f64
     }
 
-    /// Returns the standard deviation of numbers with these sums.
+    /// Returns the standard deviation from these sums.
     fn deviation(&self, [sum, squares]: [f64; 2]) -> f64 {
         let mean = sum / self.boxes as f64;
         (squares / self.boxes as f64 - mean * mean).max(0.0).sqrt()
     }
 
-    /// Returns true if the widths change with the columns of the middles, as those of a second corner
-    /// change with the first one.
+    /// Returns true if the widths change with the columns of the centres, as a second corner
+    /// changes with the first one.
     fn widths_follow(&self) -> bool {
         let moved = self.deviation(self.columns);
         moved > LEAST_MOTION * self.image[0] && self.deviation(self.rests) < FOLLOWS * moved
     }
 
-    /// Returns the reason for which most boxes stick out of the image, with what cures it.
+    /// Returns the reason why most boxes extend beyond the image, with the remedy.
     fn misplaced(&self) -> Option<String> {
         if self.boxes < LEAST_BOXES || self.fit as f64 >= FEW * self.boxes as f64 {
             return None;
@@ -133,8 +134,8 @@ impl Seen {
             "{} of the {all} boxes of people stick out of the {columns}x{rows} images",
             all - self.fit
         );
-        // Boxes of near people at the left border are inside as corners, too, but no wider the farther to
-        // the right they are.
+        // Boxes of near people at the left border are also inside if taken as corners, but they do
+        // not get wider the farther to the right they are.
         let is_corner = self.rightmost > 0.5 * columns || self.widths_follow();
         if self.are_most(self.fit_corners) && is_corner {
             return Some(format!(
@@ -143,7 +144,7 @@ impl Seen {
                 self.fit_corners
             ));
         }
-        // Boxes of near people stick out, with their middle inside.
+        // Boxes of near people extend beyond the image, but their centre is inside.
         let are_beyond = self.outside as f64 >= FEW * all as f64;
         if are_beyond && self.are_most(self.fit_exchanged) {
             return Some(format!(
@@ -160,7 +161,7 @@ impl Seen {
         })
     }
 
-    /// Returns the words for boxes that are wide, and would fit with x and y exchanged as well.
+    /// Returns a message about boxes that are wide, and would also fit with x and y exchanged.
     fn lying(&self) -> Option<String> {
         let is_likely = self.boxes >= LEAST_BOXES
             && self.are_most(self.wide)
@@ -175,7 +176,7 @@ impl Seen {
     }
 }
 
-/// Returns true for a box in the image, or a little beyond it.
+/// Returns true for a box inside the image, or slightly beyond it.
 fn fits(region: &Rect, [columns, rows]: [f64; 2]) -> bool {
     let [aside, above] = [MARGIN * columns, MARGIN * rows];
     region.x >= -aside

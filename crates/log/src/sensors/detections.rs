@@ -1,4 +1,4 @@
-//! Detections by other programs that were recorded in a log.
+//! Detections of other programs that were recorded in a log.
 
 use std::sync::Arc;
 
@@ -33,7 +33,7 @@ pub(super) const ENTRY: SensorType = SensorType {
     reader: |schema, input| Box::new(Recorded::new(schema, input)),
 };
 
-/// Names of classes that are people.
+/// Class names of people.
 const PEOPLE: [&str; 12] = [
     "person",
     "persons",
@@ -48,7 +48,7 @@ const PEOPLE: [&str; 12] = [
     "upper-body",
     "0",
 ];
-/// Largest number of other classes that are named.
+/// Maximum number of other classes that are listed.
 const NAMED_CLASSES: usize = 12;
 
 /// Messages that wait for their frame.
@@ -60,10 +60,10 @@ struct Recorded {
     layouts: Vec<Definition>,
     cameras: CameraFrames,
     waiting: Waiting,
-    /// Message of the frame that is being made.
+    /// Message for the frame that is being made.
     paired: Option<Payload>,
     boxes: BoxLayout,
-    /// Number of messages that were read, and of those that belong to a frame.
+    /// Number of messages that were read, and of those that were matched with a frame.
     read: u64,
     used: u64,
 }
@@ -109,7 +109,7 @@ impl SensorReader for Recorded {
     }
 
     fn add_to(&self, sensors: Sensors, moment: &Moment<'_>, tally: &mut Tally) -> Sensors {
-        // No message says nothing, as opposed to one without detections.
+        // Without a message nothing is known, unlike with a message without detections.
         let Some(message) = &self.paired else {
             tally.count("frames_without_detections");
             return sensors;
@@ -141,15 +141,15 @@ impl SensorReader for Recorded {
             let read = self.read;
             tally.lose("detections_lost", || {
                 format!(
-                    "{topic}: none of the {read} messages belongs to a frame, so that nobody is seen"
+                    "{topic}: none of the {read} messages belongs to a frame, so no person is detected"
                 )
             });
         }
     }
 }
 
-/// Returns the header of a message. Some drivers set the stamps of the detections alone, which is then
-/// that of the message.
+/// Returns the header of a message. Some drivers set only the stamps of the detections; the first
+/// one is then that of the message.
 fn header_of(message: &Message<'_>) -> Result<Option<Header>, CdrError> {
     let header: Header = decode(message.data)?;
     if header.stamp() != Stamp::default() {
@@ -168,7 +168,7 @@ fn stamp_of_first(layouts: &[Definition], data: &[u8]) -> Option<Stamp> {
     Some(Time { sec: seconds as i32, nanosec: nanos as u32 }.into())
 }
 
-/// Reads a message by the first of several layouts that fits.
+/// Reads a message with the first of several layouts that fits.
 fn read(layouts: &[Definition], data: &[u8]) -> Result<Value, String> {
     let mut first = None;
     for layout in layouts {
@@ -180,8 +180,8 @@ fn read(layouts: &[Definition], data: &[u8]) -> Result<Value, String> {
     Err(first.unwrap_or_else(|| "the log does not define it".to_owned()))
 }
 
-/// Returns the layouts that the messages of a channel may have: that which the log defines, else all
-/// that are known, the newest first.
+/// Returns the possible layouts of the messages of a channel: the one that the log defines, or
+/// otherwise all known ones, the newest first.
 fn layouts(channel: &Channel) -> Vec<Definition> {
     let name = &channel.schema_name;
     let told = Definition::parse(name, &channel.definition);
@@ -201,7 +201,7 @@ fn layouts(channel: &Channel) -> Vec<Definition> {
 }
 
 impl Recorded {
-    /// Counts a message with boxes in the images of another camera.
+    /// Counts a message whose boxes are in the images of another camera.
     fn leave_out(&self, topic: &str, frame: &str, tally: &mut Tally) {
         let own = &self.cameras.own;
         tally.remark("detections_of_other_camera", || {
@@ -213,7 +213,7 @@ impl Recorded {
         });
     }
 
-    /// Returns the people in a message; `None`, counted, if it cannot be read.
+    /// Returns the people in a message; `None` if it cannot be read, which is counted.
     fn detections(
         &self,
         message: &Payload,
@@ -225,7 +225,7 @@ impl Recorded {
             Err(why) => {
                 let topic = moment.topic;
                 tally.lose("messages_undecodable", || {
-                    format!("{topic}: a message of detections is not as its type says: {why}")
+                    format!("{topic}: a message of detections does not match its type: {why}")
                 });
                 return None;
             }
@@ -238,8 +238,8 @@ impl Recorded {
         }
     }
 
-    /// Returns the detections of people with their scores; the others are counted, and their classes
-    /// named.
+    /// Returns the detections of people with their scores; others are counted, and their classes
+    /// reported.
     fn people<'a>(
         &self,
         all: &'a [Value],
@@ -271,7 +271,7 @@ impl Recorded {
         people
     }
 
-    /// Returns the people in an image. Boxes that are none are counted as lost.
+    /// Returns the people in an image. Invalid boxes are counted as lost.
     fn in_image(
         &self,
         people: &[(&Value, f64)],
@@ -301,7 +301,8 @@ impl Recorded {
         found
     }
 
-    /// Returns true for the class of people. A detection without a class is of a detector of people.
+    /// Returns true for the class of people. A detection without a class is assumed to come from a
+    /// people detector.
     fn is_person(&self, class: &str) -> bool {
         let class = class.trim().to_lowercase().replace(['_', ' '], "-");
         if self.classes.is_empty() {
@@ -313,7 +314,7 @@ impl Recorded {
     }
 }
 
-/// Words of the note about other classes.
+/// Beginning of the note about other classes.
 const OTHER_CLASS: &str = "detections of the class";
 
 /// Returns class and score of the best hypothesis: an empty class and 1 for a detection without one.
@@ -335,12 +336,12 @@ fn best_hypothesis(detection: &Value) -> (String, f64) {
     best.unwrap_or_else(|| (String::new(), 1.0))
 }
 
-/// Names of the fields of a class, by preference.
+/// Names of the class field, in order of preference.
 const CLASS_FIELDS: [&str; 5] =
     ["hypothesis.class_id", "hypothesis.id", "class_name", "class_id", "id"];
 
-/// Returns the class of a hypothesis: the first field that is not empty, as the number beside a name
-/// that the detector does not know.
+/// Returns the class of a hypothesis: the first field that is not empty, for example the number
+/// beside a name that the detector leaves empty.
 fn class_of(hypothesis: &Value) -> String {
     for field in CLASS_FIELDS {
         match hypothesis.text(&[field]) {
@@ -351,7 +352,7 @@ fn class_of(hypothesis: &Value) -> String {
     String::new()
 }
 
-/// Returns the box of a detection; `None` for one with numbers that are not finite, or without a size.
+/// Returns the box of a detection; `None` if its numbers are not finite, or its size is missing.
 fn region_of(detection: &Value) -> Option<Rect> {
     let width = detection.number(&["bbox.size_x", "bbox.size.x"])?;
     let height = detection.number(&["bbox.size_y", "bbox.size.y"])?;
@@ -362,14 +363,15 @@ fn region_of(detection: &Value) -> Option<Rect> {
     (region.is_sane() && has_size).then_some(region)
 }
 
-/// Counts a person whose place cannot be as lost.
+/// Counts a person at an impossible position as lost.
 fn lose_box(topic: &str, tally: &mut Tally) {
     tally.lose("detections_invalid", || {
         format!("{topic}: a box has no size, or a number that is not finite")
     });
 }
 
-/// Returns true for a box within the first pixel, which is a share of the image and no place in it.
+/// Returns true for a box within the first pixel: its numbers are fractions of the image and not
+/// pixels.
 fn is_fraction(region: &Rect) -> bool {
     region.width <= 1.0
         && region.height <= 1.0
@@ -405,7 +407,7 @@ fn in_space(
     found
 }
 
-/// Returns the centre of the head of a person in a box: below the upper end of the box.
+/// Returns the centre of the head of the person in a 3D box, below its upper face.
 fn head_of(detection: &Value, robot_from_message: &Isometry3<f64>) -> Option<Point3<f64>> {
     let position = vector_of(detection.get("bbox.center.position")?)?;
     let turn = vector_of(detection.get("bbox.center.orientation")?)?;
@@ -425,9 +427,9 @@ fn vector_of(value: &Value) -> Option<Vector3<f64>> {
     Some(Vector3::new(value.number(&["x"])?, value.number(&["y"])?, value.number(&["z"])?))
 }
 
-/// Definition of boxes in ROS 2 Foxy and Galactic.
+/// Definition of 2D boxes in ROS 2 Foxy and Galactic.
 const FOXY_BOXES: &str = include_str!("../../msgs/Detection2DArray-foxy.msg");
-/// Definition of boxes in ROS 1 Noetic.
+/// Definition of 2D boxes in ROS 1 Noetic.
 const NOETIC_BOXES: &str = include_str!("../../msgs/Detection2DArray-noetic.msg");
-/// Definition of detections in space in ROS 2 Foxy and Galactic.
+/// Definition of 3D detections in ROS 2 Foxy and Galactic.
 const FOXY_SPACE: &str = include_str!("../../msgs/Detection3DArray-foxy.msg");

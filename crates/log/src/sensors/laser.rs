@@ -1,4 +1,4 @@
-//! Laser scans: the nearest one to an image in time, or frames of their own.
+//! Laser scans: the one nearest in time to an image, or frames of their own.
 
 use std::ops::RangeInclusive;
 
@@ -31,14 +31,14 @@ fn rank(topic: &str) -> i32 {
     2 * i32::from(topic.ends_with("/scan")) - i32::from(is_rear)
 }
 
-/// Maximum number of scans kept: those of the frames that wait for their turn.
+/// Maximum number of stored scans: those of the frames that wait for their turn.
 const KEPT: usize = 64;
 
 /// Scans of the last seconds.
 #[derive(Default)]
 pub(crate) struct Scans {
     recent: Recent<LaserScan, KEPT>,
-    /// True for a further scanner of the robot.
+    /// True for an additional scanner of the robot.
     is_further: bool,
 }
 
@@ -56,7 +56,7 @@ impl SensorReader for Scans {
         let seen = self.seen(moment, tally);
         if self.is_further {
             let known = sensors.get::<FurtherScans>().map_or(&[][..], |further| &further.0);
-            // Each scanner has its place, also while it is silent.
+            // Each scanner keeps its index, even while it is silent.
             let all: Vec<Option<Scan>> = known.iter().cloned().chain([seen]).collect();
             return sensors.with(FurtherScans(all.into()));
         }
@@ -67,18 +67,18 @@ impl SensorReader for Scans {
     }
 }
 
-/// Counts a scan whose header cannot be as lost.
+/// Counts a scan with an impossible header as lost.
 pub(crate) fn lose_scan(topic: &str, why: &str, tally: &mut Tally) {
     tally.lose("laser_scans_invalid", || format!("{topic}: a laser scan cannot be used: {why}"));
 }
 
 impl Scans {
-    /// Creates the reader of a further scanner.
+    /// Creates the reader of an additional scanner.
     pub(crate) fn further() -> Self {
         Self { is_further: true, ..Self::default() }
     }
 
-    /// Returns the scan of a moment in the frame of the robot; `None`, counted, without one.
+    /// Returns the scan at a moment in the robot frame; `None` without one, which is counted.
     fn seen(&self, moment: &Moment<'_>, tally: &mut Tally) -> Option<Scan> {
         let Some(scan) = self.recent.near(moment.stamp) else {
             tally.count("frames_without_laser");
@@ -98,8 +98,8 @@ impl Scans {
     }
 }
 
-/// Returns a scan in the frame of a robot; `robot_from` gives its poses at other times. Each point
-/// moves with the robot since the time of its own ray.
+/// Returns a scan in the robot frame; `robot_from` returns the robot's poses at other times. Each
+/// point is moved by the motion of the robot since the time of its own ray.
 pub(crate) fn seen_from(
     scan: &LaserScan,
     robot_from_laser: &Isometry3<f64>,
@@ -110,7 +110,7 @@ pub(crate) fn seen_from(
     let (rays, points): (Vec<u32>, Vec<Point3<f64>>) = points(scan)
         .map(|(ray, point)| {
             let then = robot_from_laser * point;
-            // The robot moves on a floor: heights stay.
+            // The robot moves on a floor, so heights do not change.
             let robot = motion.map_or(first, |motion| motion.robot_at(ray));
             let now = robot * then.xy();
             (ray, Point3::new(now.x, now.y, then.z))
@@ -124,13 +124,13 @@ pub(crate) fn seen_from(
         .with_unread(unread(scan).collect::<Vec<_>>())
 }
 
-/// Returns the valid ranges of the scanner, m.
+/// Returns the range limits of the scanner, m.
 pub(super) fn limits(scan: &LaserScan) -> RangeInclusive<f32> {
     scan.range_min.max(0.0)..=scan.range_max
 }
 
-/// Yields the reflections in the frame of the scanner, m, with the index of the ray. Ranges beyond
-/// the scanner's own limits, infinite and NaN ones are rays without a reflection.
+/// Yields the reflections in the frame of the scanner, m, with the index of the ray. Infinite and
+/// NaN ranges, and those beyond the scanner's own limits, are rays without a reflection.
 fn points(scan: &LaserScan) -> impl Iterator<Item = (u32, Point3<f64>)> {
     let first = f64::from(scan.angle_min);
     let step = f64::from(scan.angle_increment);
@@ -145,7 +145,7 @@ fn points(scan: &LaserScan) -> impl Iterator<Item = (u32, Point3<f64>)> {
     points.filter(|(_, point)| point.coords.norm().is_finite())
 }
 
-/// Yields the rays without a reflection, with what the scanner said instead.
+/// Yields the rays without a reflection, with the reason given by the scanner.
 fn unread(scan: &LaserScan) -> impl Iterator<Item = UnreadRay> {
     let limits = limits(scan);
     let min_m = f64::from(*limits.start());

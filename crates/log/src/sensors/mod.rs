@@ -1,20 +1,19 @@
-//! Sensors whose messages enter a frame beside its images.
+//! Sensors whose messages enter a frame in addition to its images.
 //!
-//! A new message type with its sensor takes two new files, each with a line or two in the `lib.rs`
+//! A new message type with its sensor needs two new files, each with a line or two in the `lib.rs`
 //! or `mod.rs` beside it:
 //!
-//! 1. `crates/core/src/NAME.rs`: the data as plugins receive them, with
+//! 1. `crates/core/src/NAME.rs`: the data as plugins receive it, with
 //!    [`tagalong_core::Sensor::INPUT`] set to `Input::Named("NAME")`.
 //! 2. `crates/log/src/sensors/NAME.rs`: the message (a struct with the fields of the ROS message in
-//!    their order), a [`SensorReader`] that makes the data of it, and the entry for [`SENSORS`].
+//!    the same order), a [`SensorReader`] that converts it, and the entry for [`SENSORS`].
 //!
-//! Live on a robot it also takes an arm of `listen` in `bridges/ros2/src/network.rs`, and for users a
-//! row in `docs/logs.md`.
+//! For live use on a robot it also needs an arm of `listen` in `bridges/ros2/src/network.rs`, and
+//! for users a row in `docs/logs.md`.
 //!
-//! `laser.rs` and `points.rs` take the message nearest in time (`recent.rs`), `detections.rs` pairs one
-//! message with each frame.
-//! A topic is found by type, or named as `topics.NAME` under `[input]`. Images are no entries: they
-//! make the frames, and their calibrations the cameras (`crates/log/src/images`).
+//! A topic is found by its type, or named as `topics.NAME` under `[input]`. Images have no entries
+//! here: the frames are made from them, and the cameras from their calibrations
+//! (`crates/log/src/images`).
 
 mod box_layout;
 mod detections;
@@ -38,44 +37,44 @@ use crate::tf::TfBuffer;
 use crate::walk::Message;
 use crate::{InputSettings, LogError};
 
-/// The table of all sensors beside the images.
+/// The table of all sensors other than cameras.
 pub(crate) const SENSORS: &[SensorType] = &[laser::ENTRY, detections::ENTRY, points::ENTRY];
 
-/// Entry of the table: the message types of a sensor, and how they are read.
+/// Entry of the table: the message types of a sensor, and how to read them.
 #[derive(Clone, Copy)]
 pub(crate) struct SensorType {
-    /// Input that plugins declare for the data.
+    /// Input by which plugins declare that they use the data.
     pub(crate) input: Input,
-    /// Types of the messages: package and name, as ROS 1 writes them.
+    /// Types of the messages: package and name, written as in ROS 1.
     pub(crate) messages: &'static [&'static str],
-    /// The data in words, for errors.
+    /// Name of the data in error messages.
     pub(crate) wanted: &'static str,
-    /// Rank of a topic by its name in lower case; the highest one is read unless the settings name
-    /// another. `None`: only a named topic is read.
+    /// Rank of a topic by its name in lower case; the one with the highest rank is read unless the
+    /// settings name another. `None`: the topic is read only if it is named.
     pub(crate) rank: Option<fn(&str) -> i32>,
     /// Reads the header of a message in the first pass; `None` if the message is only counted.
     pub(crate) header: fn(&Message<'_>) -> Result<Option<Header>, CdrError>,
-    /// Returns the field of a message that cannot be, for the account of the topics.
+    /// Returns the impossible field of a message, for the table of topics.
     pub(crate) fault: fn(&[u8]) -> Option<String>,
-    /// Creates the reader of a topic from the type of its messages.
+    /// Creates the reader of a topic for the type of its messages.
     pub(crate) reader: fn(&str, &InputSettings) -> Box<dyn SensorReader>,
 }
 
 /// Reader of the messages of one topic.
 pub(crate) trait SensorReader: Send + Sync {
-    /// Takes in a message.
+    /// Adds a message.
     ///
     /// # Errors
-    /// A message that cannot be decoded, which is counted by the caller.
+    /// A message that cannot be decoded; the caller counts it.
     fn take(&mut self, message: &Message<'_>, tally: &mut Tally) -> Result<(), CdrError>;
 
-    /// Selects the message of a frame, given the stamp of the next frame. It is called for every
-    /// frame, also one that turns out to be unusable.
+    /// Selects the message for a frame, given the stamp of the next frame. It is called for every
+    /// frame, even if the frame turns out to be unusable.
     fn pair(&mut self, stamp: Stamp, next: Option<Stamp>, tolerance_s: f64) {
         let _ = (stamp, next, tolerance_s);
     }
 
-    /// Returns the sensors of a frame with the data of this one, if there are any.
+    /// Returns the sensors of a frame with the data of this one added, if there are any.
     fn add_to(&self, sensors: Sensors, moment: &Moment<'_>, tally: &mut Tally) -> Sensors;
 
     /// Returns false if a live frame should wait for a message of this sensor.
@@ -84,27 +83,27 @@ pub(crate) trait SensorReader: Send + Sync {
         true
     }
 
-    /// Keeps the messages from before `newest` for [`SensorReader::restore`], because the clock has
-    /// jumped back.
+    /// Sets the messages from before `newest` aside for [`SensorReader::restore`], because the
+    /// clock has jumped back.
     fn set_aside(&mut self, newest: Stamp) {
         let _ = newest;
     }
 
-    /// Returns to the messages that were set aside.
+    /// Continues with the messages that were set aside.
     fn restore(&mut self) {}
 
-    /// Learns the frames of the cameras of a log, before the first message.
+    /// Receives the frames of the cameras in a log, before the first message.
     fn know_cameras(&mut self, cameras: &CameraFrames) {
         let _ = cameras;
     }
 
-    /// Counts at the end of a log what found no frame.
+    /// Counts, at the end of a log, the messages that were assigned to no frame.
     fn close(&mut self, topic: &str, tally: &mut Tally) {
         let _ = (topic, tally);
     }
 }
 
-/// The moment of a frame, and the transforms that are known of it.
+/// The moment of a frame, with the transforms that are known at that time.
 pub(crate) struct Moment<'a> {
     /// Topic of the sensor.
     pub(crate) topic: &'a str,
@@ -121,7 +120,7 @@ pub(crate) struct Moment<'a> {
 }
 
 impl Moment<'_> {
-    /// Returns the pose of the robot of another time in the robot frame of this one.
+    /// Returns the pose that the robot had at another time, in the robot frame of this moment.
     pub(crate) fn robot_from(&self, then: Stamp) -> Isometry2<f64> {
         let pose = self.odom_from_robot;
         pose(self.stamp).inverse() * pose(then)
@@ -129,12 +128,12 @@ impl Moment<'_> {
 }
 
 impl SensorType {
-    /// Returns the sensor that a message type belongs to.
+    /// Returns the sensor to which a message type belongs.
     pub(crate) fn of_message(schema: &str) -> Option<&'static Self> {
         SENSORS.iter().find(|sensor| sensor.reads(schema))
     }
 
-    /// Returns true for the messages of the sensor, by their type with or without its middle part.
+    /// Returns true for the messages of the sensor, by their type with or without the middle part.
     pub(crate) fn reads(&self, schema: &str) -> bool {
         self.messages.iter().any(|message| is_type(schema, message))
     }
@@ -169,7 +168,7 @@ impl InputSettings {
     }
 }
 
-/// Checks that the table of sensors has one of this name whose topic has no key of its own.
+/// Checks that the table of sensors has an entry with this name whose topic has no key of its own.
 fn check_sensor(name: &str) -> Result<(), LogError> {
     let keys: Vec<String> = SENSORS.iter().map(SensorType::key).collect();
     let wanted = format!("topics.{name}");

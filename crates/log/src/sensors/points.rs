@@ -1,4 +1,4 @@
-//! Points of 3-D lidars: the nearest cloud to an image in time, or frames of their own.
+//! Points of 3-D lidars: the cloud nearest in time to an image, or frames of their own.
 
 use nalgebra::{Isometry2, Isometry3, Point3};
 use tagalong_core::{Input, PointCloud as Cloud, Sensors, spatial_pose};
@@ -12,7 +12,7 @@ use crate::pairing::Payload;
 use crate::tally::Tally;
 use crate::walk::Message;
 
-/// Entry of lidars. Their topics are those of which [`crate::scan`] has found that the points are not
+/// Entry of lidars. Their topics are those whose points were found by [`crate::scan`] not to be
 /// those of a camera.
 pub(super) const ENTRY: SensorType = SensorType {
     input: Input::POINTS,
@@ -24,13 +24,13 @@ pub(super) const ENTRY: SensorType = SensorType {
     reader: |_, _| Box::<Clouds>::default(),
 };
 
-/// Points as the lidar delivers them before filtered ones: those have lost surfaces that hide others.
+/// Ranks raw points before filtered ones, which lack surfaces that hide others.
 fn rank(topic: &str) -> i32 {
     let is_part = ["filtered", "ground", "obstacle", "cluster", "map"];
     -i32::from(is_part.iter().any(|word| topic.contains(word)))
 }
 
-/// Maximum number of clouds kept: those of the frames that wait for their turn.
+/// Maximum number of stored clouds: those of the frames that wait for their turn.
 const KEPT: usize = 16;
 
 /// Clouds of the last seconds, not yet decoded.
@@ -64,8 +64,8 @@ impl SensorReader for Clouds {
     }
 }
 
-/// Returns a cloud in the frame of a robot that has moved by `robot_from_then` since; `None`, counted,
-/// for one that cannot be read.
+/// Returns a cloud in the robot frame after the robot has moved by `robot_from_then`; `None` if it
+/// cannot be read, which is counted.
 pub(crate) fn cloud_in_robot(
     cloud: &Payload,
     topic: &str,

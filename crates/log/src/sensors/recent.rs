@@ -1,4 +1,5 @@
-//! The last messages of a sensor that comes when it likes: a frame takes the nearest in time.
+//! The last messages of a sensor that is not synchronised with the images: a frame takes the
+//! message nearest in time.
 
 use std::collections::VecDeque;
 
@@ -37,7 +38,7 @@ impl<T, const MOST: usize> Default for Recent<T, MOST> {
 }
 
 impl<T: Stamped, const MOST: usize> Recent<T, MOST> {
-    /// Adds a message; the oldest one makes room.
+    /// Adds a message, and drops the oldest one if the buffer is full.
     pub(super) fn push(&mut self, message: T) {
         self.0.push_back(message);
         if self.0.len() > MOST {

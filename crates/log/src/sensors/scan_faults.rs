@@ -1,4 +1,4 @@
-//! Headers and ranges of laser scans that cannot be.
+//! Checks for impossible headers and ranges of laser scans.
 
 use super::laser::limits;
 use crate::msgs::LaserScan;
@@ -6,17 +6,17 @@ use crate::msgs::LaserScan;
 /// Maximum number of rays of a scan.
 const MAX_RAYS: usize = 65_536;
 
-/// Rounding of the angles by drivers, in rays and as a share of the view.
+/// Rounding of the angles by drivers, in rays and as a fraction of the field of view.
 const ROUNDED_RAYS: f64 = 2.0;
 const ROUNDED_SHARE: f64 = 0.02;
-/// Smallest angle between two rays, rad: a twentieth of that of the finest scanners.
+/// Minimum angle between two rays, rad: a twentieth of that of the finest scanners.
 const SMALLEST_STEP_RAD: f64 = 1e-5;
-/// Largest first angle, rad: some drivers turn it by whole turns.
+/// Maximum first angle, rad: some drivers add whole turns.
 const LARGEST_ANGLE_RAD: f64 = 2.0 * std::f64::consts::TAU;
-/// Largest view of a scanner, rad: one turn, and a little for rays that overlap.
+/// Maximum field of view of a scanner, rad: one turn, with a margin for rays that overlap.
 const WIDEST_RAD: f64 = 1.1 * std::f64::consts::TAU;
 
-/// Returns the field of a scan that cannot be, with its value; `None` for a scan that can be used.
+/// Returns the impossible field of a scan with its value; `None` for a scan that can be used.
 pub(crate) fn scan_fault(scan: &LaserScan) -> Option<String> {
     let fields = [
         ("angle_min", scan.angle_min),
@@ -29,8 +29,8 @@ pub(crate) fn scan_fault(scan: &LaserScan) -> Option<String> {
     if f64::from(scan.angle_min).abs() > LARGEST_ANGLE_RAD {
         return Some(format!("angle_min is {}: radians are wanted", scan.angle_min));
     }
-    // Both 0 are fields that a driver has not set: by the definition of the message, ranges beyond
-    // them are to be left out.
+    // If both are 0, the driver has not set them; by the definition of the message, all ranges
+    // beyond them would be left out.
     let limits = limits(scan);
     if limits.is_empty() || limits.start() == limits.end() || scan.range_max.is_nan() {
         let min = scan.range_min;
@@ -60,10 +60,10 @@ pub(crate) fn scan_fault(scan: &LaserScan) -> Option<String> {
     told_view_fault(scan, view_rad).or_else(|| ranges_fault(scan))
 }
 
-/// Returns the contradiction between the last angle of a scan and the number of its rays.
+/// Returns the contradiction between the last angle of a scan and its number of rays.
 fn told_view_fault(scan: &LaserScan, view_rad: f64) -> Option<String> {
     let told_rad = f64::from(scan.angle_max) - f64::from(scan.angle_min);
-    // Some drivers leave it out, and some turn it by whole turns.
+    // Some drivers leave it out, and some add whole turns.
     if !told_rad.is_finite() || told_rad == 0.0 || scan.ranges.len() < 2 {
         return None;
     }
@@ -71,7 +71,7 @@ fn told_view_fault(scan: &LaserScan, view_rad: f64) -> Option<String> {
     let slack_rad = ROUNDED_RAYS * step_rad + ROUNDED_SHARE * view_rad;
     let turned_rad = std::f64::consts::TAU - told_rad.abs();
     let off_rad = (told_rad.abs() - view_rad).abs();
-    // A scanner that is mounted upside down counts down from a larger angle to a smaller one.
+    // A scanner that is mounted upside down counts from a larger angle to a smaller one.
     let is_turned = told_rad * f64::from(scan.angle_increment) < 0.0;
     if is_turned && off_rad <= slack_rad {
         return Some(format!(
@@ -82,7 +82,7 @@ fn told_view_fault(scan: &LaserScan, view_rad: f64) -> Option<String> {
     if off_rad <= slack_rad || (turned_rad.abs() - view_rad).abs() <= slack_rad {
         return None;
     }
-    // A tenth is beyond all rounding; less is told by the ranges as they are.
+    // A tenth exceeds all rounding; smaller deviations are ignored and the ranges decide.
     (off_rad > 0.1 * view_rad.max(told_rad.abs())).then(|| {
         format!(
             "angle_min {:.3} to angle_max {:.3} is {:.3} rad, and {} ranges with angle_increment {} \
@@ -96,15 +96,15 @@ fn told_view_fault(scan: &LaserScan, view_rad: f64) -> Option<String> {
     })
 }
 
-/// Number of different values that a scanner may write in place of a range.
+/// Maximum number of distinct values that a scanner may write in place of a range.
 const MOST_CODES: usize = 3;
-/// Multiple of the largest range beyond which ranges have another unit.
+/// Multiple of the maximum range beyond which ranges must be in another unit.
 const OTHER_UNIT: f32 = 5.0;
 /// Distance that no scanner on a robot measures, m.
 const FARTHEST_M: f32 = 500.0;
 
-/// Returns the reason for which the ranges of a scan are no distances in metres. Values that a scanner
-/// writes where nothing came back are a few, each many times.
+/// Returns the reason why the ranges of a scan are not distances in metres. Values that a scanner
+/// writes for rays without a reflection are few, and each is frequent.
 fn ranges_fault(scan: &LaserScan) -> Option<String> {
     let mut values: Vec<f32> =
         scan.ranges.iter().copied().filter(|range| range.is_finite() && *range != 0.0).collect();

@@ -1,5 +1,5 @@
-//! Motion of the robot while a laser scanner turns: each ray is measured a little later than the one
-//! before it.
+//! Motion of the robot while a laser scanner turns: each ray is measured slightly later than the
+//! one before it.
 
 use nalgebra::Isometry2;
 use tagalong_core::{MAX_ODOMETRY_STEP_M, Stamp, SweepMotion};
@@ -7,13 +7,14 @@ use tagalong_core::{MAX_ODOMETRY_STEP_M, Stamp, SweepMotion};
 use crate::msgs::LaserScan;
 use crate::tally::Tally;
 
-/// Longest time from the first ray to the last, s: that of a scanner which turns twice a second.
+/// Maximum time from the first ray to the last, s: that of a scanner that turns twice a second.
 const LONGEST_S: f64 = 0.5;
-/// Multiple of the time from one scan to the next that a scan may take by the rounding of a driver.
+/// Factor by which the duration of a scan may exceed the time to the next one, because drivers
+/// round it.
 const ROUNDED: f64 = 1.1;
 
-/// Returns the motion during a scan, from the poses of the robot at all times; `None` for a scan that
-/// is taken at once, or by a robot that stands. Odometry that jumps meanwhile is no motion.
+/// Returns the motion during a scan, from the poses of the robot at all times; `None` for a scan
+/// that is taken at once, or by a robot at rest. A jump of the odometry does not count as motion.
 pub(super) fn sweep_motion(
     scan: &LaserScan,
     first: Isometry2<f64>,
@@ -27,25 +28,26 @@ pub(super) fn sweep_motion(
     Some(SweepMotion { first, last, last_ray: scan.ranges.len() as u32 - 1 })
 }
 
-/// Returns the time from the first ray to the last, s; `None` if the scan states none, or one that
-/// cannot be.
+/// Returns the time from the first ray to the last, s; `None` if the scan states none, or an
+/// impossible one.
 fn sweep_s(scan: &LaserScan) -> Option<f64> {
     let sweep_s = told_s(scan);
     (sweep_s > 0.0 && sweep_s <= longest_s(scan)).then_some(sweep_s)
 }
 
-/// Returns the time from the first ray to the last by the header, s.
+/// Returns the time from the first ray to the last according to the header, s.
 fn told_s(scan: &LaserScan) -> f64 {
     f64::from(scan.time_increment) * scan.ranges.len().saturating_sub(1) as f64
 }
 
-/// Returns the longest time that the scan can take, s: at most that to the next one, where it is stated.
+/// Returns the maximum duration of the scan, s: at most the time to the next one, if that is
+/// stated.
 fn longest_s(scan: &LaserScan) -> f64 {
     let scan_s = f64::from(scan.scan_time);
     if scan_s > 0.0 { (ROUNDED * scan_s).min(LONGEST_S) } else { LONGEST_S }
 }
 
-/// Counts a scan that states times of its rays that cannot be: it is taken as measured at once.
+/// Counts a scan with impossible ray times; it is treated as measured at once.
 pub(crate) fn note_impossible_times(scan: &LaserScan, topic: &str, tally: &mut Tally) {
     let sweep_s = told_s(scan);
     if sweep_s != 0.0 && self::sweep_s(scan).is_none() {

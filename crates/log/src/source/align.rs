@@ -1,4 +1,4 @@
-//! Depth images in the view of the colour camera.
+//! Transformation of depth images to the view of the colour camera.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::tally::Tally;
 use crate::tf::TfBuffer;
 use crate::topics::{Problem, geometry_problem, transform_problem};
 
-/// A depth image with the colour image that it belongs to.
+/// A depth image together with its colour image.
 pub(super) struct DepthMoment<'a> {
     pub(super) image: &'a Payload,
     pub(super) depth: &'a Payload,
@@ -36,16 +36,17 @@ impl DepthMoment<'_> {
     }
 }
 
-/// Brings depth images into the view of the colour camera.
+/// Transforms depth images to the view of the colour camera.
 #[derive(Default)]
 pub(super) struct DepthAligner {
     registration: Option<Registration>,
-    /// True once it is told that depth is taken to be registered.
+    /// True once it was reported that depth is assumed to be registered.
     is_told: bool,
 }
 
 impl DepthAligner {
-    /// Returns a depth image in the view of the colour camera; `None`, counted, if that cannot be.
+    /// Returns a depth image as seen by the colour camera; `None` if that is impossible, which is
+    /// counted.
     pub(super) fn align(
         &mut self,
         plan: &Plan,
@@ -56,7 +57,7 @@ impl DepthAligner {
         let seen = shifted(seen, plan.input.depth_offset_px);
         let camera = moment.camera;
         let has_same_size = (seen.width(), seen.height()) == (camera.width, camera.height);
-        // Registered by the driver: same size, frame and lens.
+        // The driver has registered the image if size, frame and lens are the same.
         if has_same_size && moment.has_one_frame() && plan.same_lens() {
             return Some(Arc::new(seen));
         }
@@ -103,7 +104,7 @@ impl DepthAligner {
         tally.remark("depth_registered", || {
             "depth is registered to the colour camera through tf and both calibrations".to_owned()
         });
-        // Made anew only after a change of the transform, because its rays are costly.
+        // Recomputed only if the transform has changed, because its rays are costly.
         if !self.registration.as_ref().is_some_and(|known| known.is_for(&colour_from_depth)) {
             self.registration = Some(Registration::new(from, camera, colour_from_depth));
         }
@@ -111,8 +112,8 @@ impl DepthAligner {
     }
 }
 
-/// Returns the reason for which a depth image cannot be moved into the view of the colour camera: what
-/// the whole log lacks, else what is not there at the time of the image.
+/// Returns the reason why a depth image cannot be transformed to the view of the colour camera:
+/// what the whole log lacks, or otherwise what is missing at the time of the image.
 fn problem_at(plan: &Plan, moment: &DepthMoment<'_>, seen: &DepthImage) -> Problem {
     let colour = plan.primary();
     let depth = plan.chosen.depth.as_deref().unwrap_or_default();
@@ -148,7 +149,7 @@ fn problem_at(plan: &Plan, moment: &DepthMoment<'_>, seen: &DepthImage) -> Probl
     }
 }
 
-/// Shifts the image by columns and rows; the pixels that come in are unknown.
+/// Shifts the image by columns and rows; pixels from outside have no reading.
 fn shifted(depth: DepthImage, offset: [i32; 2]) -> DepthImage {
     let [right, down] = offset.map(i64::from);
     if (right, down) == (0, 0) {

@@ -1,4 +1,4 @@
-//! Assembly of frames from the images that belong together.
+//! Assembly of frames from images that belong together.
 
 use std::sync::Arc;
 
@@ -38,7 +38,7 @@ use crate::topics::Problem;
 pub(super) struct Assembler {
     index: u64,
     camera: Option<Arc<Camera>>,
-    /// True once it is told that a pose of the camera is held.
+    /// True once it was reported that a pose of the camera is held.
     is_hold_told: bool,
     aligner: DepthAligner,
     unwrapping: Unwrapping,
@@ -48,7 +48,7 @@ pub(super) struct Assembler {
 }
 
 impl Assembler {
-    /// Returns the number of messages that were to make a frame.
+    /// Returns the number of messages from which frames were to be made.
     pub(super) fn count(&self) -> u64 {
         self.index
     }
@@ -58,8 +58,8 @@ impl Assembler {
         self.camera.as_ref()
     }
 
-    /// Makes a frame of an image and its partners; `None` if a required part is missing or damaged,
-    /// which is counted.
+    /// Makes a frame from an image and its partners; `None` if a required part is missing or
+    /// damaged, which is counted.
     pub(super) fn assemble(
         &mut self,
         plan: &Plan,
@@ -68,7 +68,7 @@ impl Assembler {
         intake: &mut Intake,
         tally: &mut Tally,
     ) -> Option<LogFrame> {
-        // Counted before anything can fail, so that the index does not depend on the inputs.
+        // Incremented before anything can fail, so that the index does not depend on the inputs.
         self.index += 1;
         let tolerance_s = plan.input.pair_tolerance_s;
         intake.pair_sensors(image.stamp, next, tolerance_s);
@@ -94,7 +94,7 @@ impl Assembler {
         }
         let requires_depth = plan.inputs.requires(Input::Depth);
         let requires_right = plan.inputs.requires(Input::Right);
-        // Tested before decoding, which is the costly part.
+        // Tested before decoding, which is the expensive part.
         let lacks_depth = requires_depth && plan.has_second_depth() && depth.is_none();
         if lacks_depth || requires_right && right.is_none() {
             return None;
@@ -120,7 +120,7 @@ impl Assembler {
         Some(self.finish(plan, image.stamp, camera, sensors, intake, tally))
     }
 
-    /// Makes a frame of a laser scan alone; `None` if it is damaged or its pose is unknown, which
+    /// Makes a frame from a laser scan alone; `None` if it is damaged or its pose is unknown, which
     /// is counted.
     fn assemble_scan(
         &mut self,
@@ -152,7 +152,7 @@ impl Assembler {
         Some(self.finish(plan, scan.stamp, camera, sensors, intake, tally))
     }
 
-    /// Makes a frame of the points of a lidar alone; `None` if they are damaged or their pose is
+    /// Makes a frame from the points of a lidar alone; `None` if they are damaged or their pose is
     /// unknown, which is counted.
     fn assemble_points(
         &mut self,
@@ -171,7 +171,8 @@ impl Assembler {
         Some(self.finish(plan, cloud.stamp, camera, sensors, intake, tally))
     }
 
-    /// Returns the camera of a frame without images, the same one while the sensor stays where it is.
+    /// Returns the camera of a frame without images; it is the same object as long as the pose of
+    /// the sensor is unchanged.
     fn blind_camera(&mut self, pose: Isometry3<f64>) -> Arc<Camera> {
         let camera = Camera::blind(pose);
         match &self.camera {
@@ -180,7 +181,7 @@ impl Assembler {
         }
     }
 
-    /// Decodes the image that makes the frame, as far as it is used; returns it with the size of
+    /// Decodes the image from which the frame is made, if it is used; returns it with the size of
     /// the frame.
     fn primary(
         &mut self,
@@ -203,7 +204,7 @@ impl Assembler {
         }
     }
 
-    /// Checks that the image has the size of the calibration; `None`, counted, if not.
+    /// Checks that the image has the size of the calibration; `None` if not, which is counted.
     fn check_calibration(
         &mut self,
         plan: &Plan,
@@ -237,7 +238,7 @@ impl Assembler {
         Some((unwrapped.ok()?, (columns, rows)))
     }
 
-    /// Returns the camera at the time of an image; the last one if it is unchanged.
+    /// Returns the camera at the time of an image; the same object as before if it is unchanged.
     fn camera_at(
         &mut self,
         plan: &Plan,
@@ -254,8 +255,9 @@ impl Assembler {
             if known.is_some() && !self.is_hold_told {
                 self.is_hold_told = true;
                 tally.note(format!(
-                    "{} has no pose of the camera at some frames, which get the last known one: if the \
-                     camera does not move on the robot, publish it on /tf_static, else throughout",
+                    "{} has no pose of the camera at some frames, which get the last known one: \
+                     publish it on /tf_static if the camera does not move on the robot, otherwise \
+                     throughout the log",
                     plan.mount.source()
                 ));
             }
@@ -277,14 +279,14 @@ impl Assembler {
             |known| lens_of(&known, width, height),
         );
         let camera = Camera { lens, width, height, robot_from_camera };
-        // A new object only after a change, so that frames share one.
+        // A new object only after a change, so that frames share it.
         if self.camera.as_deref() != Some(&camera) {
             self.camera = Some(Arc::new(camera));
         }
         self.camera.clone()
     }
 
-    /// Returns the sensors of a frame with those beside the images.
+    /// Returns the sensors of a frame with those other than cameras added.
     fn sense(
         &self,
         plan: &Plan,
@@ -308,8 +310,8 @@ impl Assembler {
         })
     }
 
-    /// Returns the sensors of a frame with the readings of the further sources of obstacles, if there
-    /// are any sources.
+    /// Returns the sensors of a frame with the readings of the further obstacle sources added, if
+    /// there are any sources.
     fn sense_obstacles(
         &self,
         plan: &Plan,
@@ -322,7 +324,7 @@ impl Assembler {
         if !plan.inputs.uses(Input::OBSTACLES) || plan.input.sources.is_empty() {
             return sensors;
         }
-        // Out of the intake, which gives the poses meanwhile.
+        // Taken out of the intake, which provides the poses in the meantime.
         let mut readers = std::mem::take(&mut intake.obstacles);
         let format = DepthFormat { unit_m: plan.input.depth_unit_m, limits: &plan.limits };
         let mut readings = Vec::new();
@@ -351,7 +353,8 @@ impl Assembler {
         intake: &mut Intake,
         tally: &mut Tally,
     ) -> LogFrame {
-        // Before `previous` is this frame: without odometry it gives the pose.
+        // Called before `previous` is set to this frame, because without odometry `previous` gives
+        // the pose.
         let sensors = self.sense(plan, stamp, &camera, sensors, intake, tally);
         let sensors = self.sense_obstacles(plan, stamp, &camera, sensors, intake, tally);
         let here = self.pose_at(plan, stamp, intake);
@@ -400,7 +403,7 @@ impl Assembler {
         self.pose_at(plan, now, intake).pose.inverse() * self.pose_at(plan, then, intake).pose
     }
 
-    /// Returns true if odometry jumps between the previous frame and this one.
+    /// Returns true if the odometry jumps between the previous frame and this one.
     fn has_jumped(&self, plan: &Plan, stamp: Stamp, intake: &Intake, tally: &mut Tally) -> bool {
         let from_topic = matches!(plan.odom_frames, Some(None));
         let jumped = from_topic
@@ -437,7 +440,7 @@ impl Assembler {
     }
 }
 
-/// Compares the frame of an image that a frame is made of with that of the first image of its topic.
+/// Compares the frame id of an image with that of the first image on its topic.
 fn watch_frame(
     plan: &Plan,
     topic: Option<&str>,
@@ -452,8 +455,8 @@ fn watch_frame(
     }
 }
 
-/// Counts a message that makes no frame for want of a pose, and tells once if the clock of tf is the
-/// reason.
+/// Counts a message without a pose, from which no frame can be made, and reports once if the clock
+/// of tf is the reason.
 fn count_without_pose(plan: &Plan, name: &'static str, tally: &mut Tally) {
     tally.count(name);
     if tally.counters.get(name) == Some(&1)
@@ -472,7 +475,7 @@ fn odometry_age_s(plan: &Plan, stamp: Stamp, intake: &Intake) -> f64 {
     }
 }
 
-/// Counts a frame whose next reading of odometry lies far in its future, and tells how far.
+/// Counts a frame whose next odometry reading lies far in its future, and reports how far.
 fn note_odometry_ahead(plan: &Plan, stamp: Stamp, intake: &Intake, tally: &mut Tally) {
     let ahead_s = match &plan.odom_frames {
         None => None,
@@ -553,7 +556,7 @@ fn is_disparity(plan: &Plan, topic: &str) -> bool {
     is_depth && (plan.disparity.is_some() || kind == Some(Type::DisparityImage))
 }
 
-/// Decodes disparities to depth; invalid ones are counted.
+/// Converts disparities to depth; invalid ones are counted.
 fn depth_of_disparity(
     plan: &Plan,
     topic: &str,
@@ -578,7 +581,8 @@ fn depth_of_disparity(
     Some(depth)
 }
 
-/// Returns the size of an image that makes a frame, from its header; a failure is counted as lost.
+/// Returns the size of an image from which a frame is made, read from its header; a failure is
+/// counted as lost.
 fn size_without_pixels(plan: &Plan, image: &Payload, tally: &mut Tally) -> Option<(usize, usize)> {
     read(plan, plan.primary(), image, tally, |image: AnyImage<'_>| match image {
         AnyImage::Raw(image) => size_of_raw(&image, &plan.limits),
@@ -606,7 +610,7 @@ fn read<T>(
 ) -> Option<T> {
     let kind = plan.scan.topics.get(topic).map(|topic| topic.kind);
     let message = match kind {
-        // Pictures of video are decoded as they come.
+        // Pictures of video have been decoded on arrival.
         Some(Type::Image | Type::Video) => decode(&image.data).map(AnyImage::Raw),
         Some(Type::DisparityImage) => decode(&image.data).map(AnyImage::Disparity),
         Some(Type::PointCloud) => decode(&image.data).map(AnyImage::Cloud),

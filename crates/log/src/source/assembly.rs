@@ -1,4 +1,4 @@
-//! Frames from messages of any source.
+//! Assembly of frames from the messages of any source.
 
 use std::sync::Arc;
 
@@ -29,7 +29,7 @@ pub(super) struct Assembly {
     intake: Intake,
     assembler: Assembler,
     ended: bool,
-    /// True once what found no frame is counted.
+    /// True once the messages without a frame were counted.
     is_closed: bool,
 }
 
@@ -54,7 +54,7 @@ impl Assembly {
         self.intake.take(message, &mut self.tally);
     }
 
-    /// Reads on to the next frame; `None` at the end of the messages.
+    /// Reads messages up to the next frame; `None` at the end of the messages.
     pub(super) fn read(&mut self, messages: &mut dyn Messages) -> Option<LogFrame> {
         loop {
             let frame = self.next_frame();
@@ -68,7 +68,7 @@ impl Assembly {
         }
     }
 
-    /// Returns the next frame that no later message can change.
+    /// Returns the next frame, which no later message can change.
     fn next_frame(&mut self) -> Option<LogFrame> {
         while let Some((image, next)) = self.intake.frames.pop(self.ended) {
             let plan = &self.plan;
@@ -79,7 +79,7 @@ impl Assembly {
                 return frame;
             }
         }
-        // Partners that still wait at the end have none.
+        // Images that still wait at the end have no partner.
         if self.ended && !self.is_closed {
             self.is_closed = true;
             self.intake.close(&mut self.tally);
@@ -88,7 +88,8 @@ impl Assembly {
         None
     }
 
-    /// Tells why many frames have no image of a second topic: as a loss where they are useless without.
+    /// Reports why many frames have no image of a second topic, as a loss if they are useless
+    /// without it.
     fn tell_unpaired(&mut self) {
         let plan = &self.plan;
         let chosen = &plan.chosen;
@@ -107,8 +108,9 @@ impl Assembly {
                 {
                     let name = input.name();
                     self.tally.note(format!(
-                        "{without} of {frames} images make no frame, because no image of {topic} belongs to \
-                         them: {words}; record it at their rate, or take a pipeline without {name}"
+                        "{without} of {frames} images make no frame, because no image of {topic} \
+                         belongs to them: {words}; record that topic at their rate, or take a \
+                         pipeline without {name}"
                     ));
                 }
                 continue;
@@ -160,7 +162,7 @@ impl Assembly {
         self.assembler.misfit.as_ref()
     }
 
-    /// Returns the facts about the source, complete after the first frame.
+    /// Returns the properties of the source, which are complete after the first frame.
     pub(super) fn facts(&self) -> LogFacts {
         let scan = &self.plan.scan;
         let chosen = &self.plan.chosen;

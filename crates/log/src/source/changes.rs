@@ -1,4 +1,4 @@
-//! Changes of the cameras on the way, after which positions in the images are wrong.
+//! Changes of the cameras during a recording, after which positions in the images are wrong.
 
 use std::collections::BTreeMap;
 
@@ -13,16 +13,16 @@ use crate::pairing::Payload;
 use crate::tally::Tally;
 use crate::tf::{TfBuffer, plain};
 
-/// Least distance by which a mount has moved, m.
+/// Minimum translation for which a mount counts as changed, m.
 const MOVED_M: f64 = 1e-3;
-/// Least angle by which a mount has turned, degrees.
+/// Minimum rotation for which a mount counts as changed, degrees.
 const TURNED_DEG: f64 = 0.1;
 /// Consequence of a change, at the end of a sentence about it.
 const CONSEQUENCE: &str = "the first one is used throughout, and from the change on tracks stay \
                            where they were";
 
-/// Watch over all that must stay as it is during a run: the calibrations of the cameras, the frames of
-/// the images, and the mounts that static transforms give.
+/// Watches everything that must not change during a run: the calibrations of the cameras, the frame
+/// ids of the images, and the mounts in the static transforms.
 pub(super) struct CameraWatch {
     /// First calibrations, by topic.
     infos: BTreeMap<String, CameraInfo>,
@@ -31,7 +31,7 @@ pub(super) struct CameraWatch {
     changed_at: Option<Stamp>,
 }
 
-/// Pose of a sensor that static transforms give, wholly or in part.
+/// Pose of a sensor that is given by static transforms, wholly or in part.
 struct WatchedMount {
     target: String,
     source: String,
@@ -49,18 +49,18 @@ impl CameraWatch {
         Self { infos, mounts: watched_mounts(plan), changed_at: None }
     }
 
-    /// Returns true for the topic of a calibration.
+    /// Returns true for the topic of a watched calibration.
     pub(super) fn has_info(&self, topic: &str) -> bool {
         self.infos.contains_key(topic)
     }
 
-    /// Compares a calibration with the first one of its topic. A blank one says nothing, and is no
+    /// Compares a calibration with the first one on its topic. A blank one does not count as a
     /// change.
     pub(super) fn watch_info(&mut self, topic: &str, info: &CameraInfo, tally: &mut Tally) {
         if is_blank(info) {
             return;
         }
-        // Field by field, because the header differs in each message.
+        // Compared field by field, because the header differs in each message.
         let changed = self.infos.get(topic).is_some_and(|first| {
             first.k != info.k || first.d != info.d || first.p != info.p || first.roi != info.roi
         });
@@ -72,7 +72,7 @@ impl CameraWatch {
         }
     }
 
-    /// Compares the frame of an image with that of the first image of its topic.
+    /// Compares the frame id of an image with that of the first image on its topic.
     pub(super) fn watch_frame(
         &mut self,
         topic: &str,
@@ -95,12 +95,12 @@ impl CameraWatch {
         });
     }
 
-    /// Returns the static parts of the watched mounts, in their order.
+    /// Returns the static parts of the watched mounts, in order.
     pub(super) fn mounts(&self, tf: &TfBuffer) -> Vec<Option<Isometry3<f64>>> {
         self.mounts.iter().map(|mount| tf.static_pose(&mount.target, &mount.source)).collect()
     }
 
-    /// Compares the static parts of the mounts with those from `before`; returns true if one has
+    /// Compares the static parts of the mounts with those of `before`; returns true if one of them
     /// changed at this time.
     pub(super) fn watch_mounts(
         &mut self,
@@ -111,7 +111,7 @@ impl CameraWatch {
     ) -> bool {
         let mut has_changed = false;
         for (mount, (old, new)) in self.mounts.iter().zip(before.iter().zip(self.mounts(tf))) {
-            // A mount that becomes known is no change.
+            // A mount that only becomes known is not a change.
             let Some(old) = old.filter(|old| has_moved(old, new.as_ref())) else { continue };
             has_changed = true;
             tally.lose("mount_changes", || {
@@ -130,12 +130,12 @@ impl CameraWatch {
         has_changed
     }
 
-    /// Returns true if something has changed by this time.
+    /// Returns true if something has changed before this time.
     pub(super) fn has_changed(&self, stamp: Stamp) -> bool {
         self.changed_at.is_some_and(|at| at <= stamp)
     }
 
-    /// Keeps a change in force after a jump back of the clock, to times before it.
+    /// Keeps a change in force for the earlier times after a backward jump of the clock.
     pub(super) fn clock_jumps(&mut self) {
         if self.changed_at.is_some() {
             self.changed_at = Some(Stamp::default());
@@ -148,8 +148,8 @@ impl CameraWatch {
     }
 }
 
-/// Returns the poses on which the frames depend: that of the camera on the robot, of the depth camera
-/// on the colour camera, and of the laser scanner on the robot.
+/// Returns the poses on which the frames depend: of the camera on the robot, of the depth camera
+/// relative to the colour camera, and of the laser scanner on the robot.
 fn watched_mounts(plan: &Plan) -> Vec<WatchedMount> {
     let primary = plan.scan.frame_of(plan.primary());
     let depth = plan.chosen.depth.as_ref().and_then(|topic| plan.scan.frame_of(topic));
@@ -173,7 +173,8 @@ fn watched_mounts(plan: &Plan) -> Vec<WatchedMount> {
         .collect()
 }
 
-/// Returns true if a pose has moved or turned by more than a republished one differs, or is gone.
+/// Returns true if a pose has moved or turned by more than repeated publishing explains, or is
+/// gone.
 fn has_moved(old: &Isometry3<f64>, new: Option<&Isometry3<f64>>) -> bool {
     let Some(new) = new else { return true };
     let moved_m = (old.translation.vector - new.translation.vector).norm();

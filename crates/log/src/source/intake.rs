@@ -1,4 +1,4 @@
-//! Distribution of the messages of a log to the parts of a frame.
+//! Distribution of the messages of a log to the parts of frames.
 
 use std::collections::BTreeMap;
 
@@ -22,33 +22,33 @@ use crate::tf::TfBuffer;
 use crate::topics::{Chosen, camera_frames};
 use crate::walk::Message;
 
-/// Time of recording of a live message whose arrival is not told.
+/// Recording time of a live message whose arrival time is not known.
 pub(super) const UNKNOWN_TIME: u64 = 0;
-/// Longest time from the last frame to a message without a stamp that counts, s.
+/// Maximum time between the last frame and a message without a stamp, s, up to which it counts.
 const MAX_WAIT_S: f64 = 10.0;
 
-/// Messages that have been read and not yet become a frame.
+/// Messages that have been read but are not yet part of a frame.
 pub(super) struct Intake {
     chosen: Chosen,
-    /// Topic that makes the frames: colour, or depth without it, or laser scans.
+    /// Topic from which the frames are made: colour, or depth without colour, or laser scans.
     primary: String,
     pub(super) watch: CameraWatch,
-    /// Newest stamp of the messages that make the frames.
+    /// Newest stamp of the messages from which frames are made.
     newest: Option<Stamp>,
     pub(super) frames: Reorder,
     pub(super) depth: Waiting,
     pub(super) right: Waiting,
-    /// Topics of the sensors beside the images, with their readers.
+    /// Topics of the sensors other than cameras, with their readers.
     pub(super) sensors: Vec<(String, Box<dyn SensorReader>)>,
-    /// Readers of the further sources of obstacles.
+    /// Readers of the further obstacle sources.
     pub(super) obstacles: Vec<ObstacleReader>,
-    /// Stamp of the last message that makes a frame, and the time of its arrival, ns.
+    /// Stamp of the last message from which a frame is made, and the time of its arrival, ns.
     heard: Option<(Stamp, u64)>,
     pub(super) tf: TfBuffer,
     pub(super) poses: PoseBuffer,
     /// Decoders of the topics with video.
     videos: BTreeMap<String, VideoDecoder>,
-    /// True if messages have the times of their recording in place of their stamps.
+    /// True if messages have recording times in place of their stamps.
     has_recording_times: bool,
 }
 
@@ -58,7 +58,7 @@ impl Intake {
         let primary = plan.primary();
         let sources = plan.sources.iter();
         let mut tf = scan.tf.clone();
-        // The first pass left one sample of each moving transform, to know the links only.
+        // The first pass left one sample of each moving transform, only to know the links.
         tf.clear_moving();
         Self {
             chosen: chosen.clone(),
@@ -78,7 +78,7 @@ impl Intake {
         }
     }
 
-    /// Takes in a message. One that cannot be decoded is counted as lost.
+    /// Adds a message. One that cannot be decoded is counted as lost.
     pub(super) fn take(&mut self, message: &Message<'_>, tally: &mut Tally) {
         if !self.has_recording_times {
             return self.take_stamped(message, tally);
@@ -123,7 +123,7 @@ impl Intake {
         }
     }
 
-    /// Takes in what makes a frame, or belongs to one.
+    /// Adds an image or a scan from which a frame is made, or that belongs to one.
     fn take_image(&mut self, message: &Message<'_>, image: Payload, tally: &mut Tally) {
         let topic = &message.channel.topic;
         if *topic == self.primary {
@@ -136,8 +136,8 @@ impl Intake {
         }
     }
 
-    /// Returns the stamp, the frame and the bytes of an image or a scan, of a packet of video those of
-    /// its picture; `None` for a packet without one.
+    /// Returns the stamp, the frame id and the bytes of an image or a scan, and for a video packet
+    /// those of its picture; `None` for a packet without one.
     fn payload(
         &mut self,
         message: &Message<'_>,
@@ -151,7 +151,7 @@ impl Intake {
             Ok(Picture::Parameters) => {}
             Ok(Picture::OutOfOrder) => tally.lose("video_out_of_order", || {
                 format!(
-                    "{topic} at {}: the picture belongs before one with an earlier stamp, so that its \
+                    "{topic} at {}: the picture belongs before one with an earlier stamp, so its \
                      time is not known; record video without B-frames",
                     packet.header.stamp()
                 )
@@ -169,7 +169,8 @@ impl Intake {
         Ok(None)
     }
 
-    /// Hands a message to the sources of obstacles on its topic, which may also be one of the frames.
+    /// Passes a message to the obstacle sources on its topic, which may also be a topic from which
+    /// frames are made.
     fn take_obstacles(&mut self, message: &Message<'_>, tally: &mut Tally) {
         let topic = &message.channel.topic;
         let arrival = self.arrival(message.log_time);
@@ -180,8 +181,9 @@ impl Intake {
         }
     }
 
-    /// Returns the time of arrival of a message by the clock of the stamps, which may not be that of
-    /// the arrivals: that of the last frame, and the time since then where both times are known.
+    /// Returns the arrival time of a message by the clock of the stamps, which may differ from that
+    /// of the arrivals: the stamp of the last frame, plus the time since then if both arrival times
+    /// are known.
     fn arrival(&self, log_time: u64) -> Stamp {
         let Some((stamp, then)) = self.heard else { return Stamp::default() };
         if then == UNKNOWN_TIME || log_time == UNKNOWN_TIME {
@@ -206,7 +208,7 @@ impl Intake {
                 };
                 tally.lose("frames_of_same_stamp", || {
                     format!(
-                        "{topic}: different images have the same stamp, and only the first of them \
+                        "{topic}: different images have the same stamp, and only the first one \
                          makes a frame: {remedy}"
                     )
                 });
@@ -216,7 +218,7 @@ impl Intake {
                 tally.count("time_jumps_back");
                 self.newest = self.frames.newest();
                 self.watch.clock_jumps();
-                // Partners with older stamps than the newest image belong to the new time already.
+                // Partners with stamps before the newest image belong to the new time already.
                 if let Some(newest) = newest {
                     self.depth.set_aside(newest);
                     self.right.set_aside(newest);
@@ -235,7 +237,7 @@ impl Intake {
         }
     }
 
-    /// Returns the reader of a topic, if it is one of a sensor.
+    /// Returns the reader of a topic, if it belongs to a sensor.
     fn reader(&mut self, topic: &str) -> Option<&mut dyn SensorReader> {
         let (_, reader) = self.sensors.iter_mut().find(|(name, _)| name == topic)?;
         Some(reader.as_mut())
@@ -254,14 +256,14 @@ impl Intake {
         }
     }
 
-    /// Takes in static transforms during the run; those that move a camera are not used.
+    /// Adds static transforms during the run; those that would move a camera are not used.
     fn take_static(&mut self, tf: &TFMessage, topic: &str, now: Stamp, tally: &mut Tally) {
         let before = self.watch.mounts(&self.tf);
         let children = tf.transforms.iter().map(|transform| &transform.child_frame_id);
         let saved: Vec<_> = children.map(|child| self.tf.saved(child)).collect();
         self.insert_all(tf, topic, tally);
         if self.watch.watch_mounts(&before, &self.tf, now, tally) {
-            // In reverse order, because a frame may be there twice.
+            // Restored in reverse order, because a frame may occur twice.
             saved.into_iter().rev().for_each(|link| self.tf.restore(link));
         }
     }
@@ -302,8 +304,8 @@ impl Intake {
         })
     }
 
-    /// Returns to the partners of the new time once all images from before a jump of the clock are
-    /// delivered.
+    /// Continues with the partners of the new time once all images from before a jump of the clock
+    /// are delivered.
     pub(super) fn settle(&mut self) {
         if self.frames.is_flushed() {
             self.depth.restore();
@@ -312,7 +314,7 @@ impl Intake {
         }
     }
 
-    /// Counts at the end of a log what found no frame.
+    /// Counts, at the end of a log, the messages that were assigned to no frame.
     pub(super) fn close(&mut self, tally: &mut Tally) {
         tally.add("depth_without_colour", self.depth.leave());
         tally.add("right_without_left", self.right.leave());
@@ -329,7 +331,7 @@ fn videos(plan: &Plan) -> BTreeMap<String, VideoDecoder> {
     videos.map(|(name, _)| (name.clone(), VideoDecoder::new(&plan.limits))).collect()
 }
 
-/// Creates the readers of the chosen topics; the topic that makes the frames has none.
+/// Creates the readers of the chosen topics, except for the topic from which the frames are made.
 fn readers(plan: &Plan, primary: &str) -> Vec<(String, Box<dyn SensorReader>)> {
     let Plan { scan, chosen, input, .. } = plan;
     let topics = SENSORS.iter().filter_map(|sensor| Some((sensor, chosen.sensor(sensor.input)?)));
@@ -348,7 +350,7 @@ fn readers(plan: &Plan, primary: &str) -> Vec<(String, Box<dyn SensorReader>)> {
     readers
 }
 
-/// Returns the stamp, the frame and the bytes of an image or a scan.
+/// Returns the stamp, the frame id and the bytes of an image or a scan.
 fn payload(message: &Message<'_>) -> Result<Payload, CdrError> {
     let header = match Type::of(&message.channel.schema_name) {
         Type::Image => decode::<Image<'_>>(message.data)?.header,

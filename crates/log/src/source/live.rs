@@ -1,8 +1,8 @@
 //! Frames from messages that arrive live.
 //!
-//! The two passes over a file are two phases here: [`Listening`] gathers until all inputs of the
-//! pipeline are there, [`LiveSource`] makes frames. An image that comes too late for a frame is not
-//! waited for: see [`LiveSource::newest_frame`].
+//! The two passes over a file become two phases here: [`Listening`] collects messages until all
+//! inputs of the pipeline are there, and [`LiveSource`] makes frames. Images that come too late for
+//! a frame are not waited for: see [`LiveSource::newest_frame`].
 
 use std::collections::BTreeMap;
 use std::slice::Iter;
@@ -17,7 +17,7 @@ use crate::sensors::SensorType;
 use crate::walk::{Channel, Message};
 use crate::{InputSettings, Inputs, Limits, LogError};
 
-/// Number of messages kept of each topic, to fit the floor to.
+/// Number of stored messages of each topic, for fitting the floor.
 const KEPT: u64 = 16;
 
 /// Channel with one of its messages.
@@ -41,7 +41,7 @@ impl Messages for Iter<'_, Held> {
 }
 
 impl Listening {
-    /// Starts without any topic. `name` is used in errors in place of the path of a log.
+    /// Starts without any topic. `name` replaces the path of a log in errors.
     ///
     /// # Errors
     /// [`LogError::Settings`] for invalid values.
@@ -63,7 +63,7 @@ impl Listening {
         })
     }
 
-    /// Adds a topic; returns false if it was known.
+    /// Adds a topic; returns false if it was already known.
     pub fn announce(&mut self, topic: &str, message_type: &str) -> bool {
         if self.channels.contains_key(topic) {
             return false;
@@ -81,9 +81,9 @@ impl Listening {
         true
     }
 
-    /// Returns true for an announced topic with messages that frames can be made of. Some
-    /// sensors are used only if the settings name their topic: detections, because Tagalong's own
-    /// output has the same type.
+    /// Returns true for an announced topic whose messages frames can use. Some sensors are used
+    /// only if the settings name their topic, for example detections, because Tagalong's own output
+    /// has the same type.
     pub fn wants(&self, topic: &str) -> bool {
         let Some(channel) = self.channels.get(topic) else { return false };
         if self.input.sources.iter().any(|source| source.topic == topic) {
@@ -103,19 +103,19 @@ impl Listening {
         self.gathering.has_image()
     }
 
-    /// Takes in a message, in CDR with its encapsulation header. Messages of topics that were not
+    /// Adds a message, in CDR with its encapsulation header. Messages on topics that were not
     /// announced are ignored.
     pub fn take(&mut self, topic: &str, data: &[u8]) {
         let Some(channel) = self.channels.get(topic) else { return };
         self.gathering.take(&message(channel, data));
-        // Only the first messages are kept, because listening may last for ever.
+        // Only the first messages are stored, because listening may go on for ever.
         if self.gathering.topic(topic, "", "cdr").count <= KEPT {
             self.held.push((Arc::clone(channel), data.to_vec()));
         }
     }
 
-    /// Starts to make frames, if all inputs have been seen. To be called again after an error,
-    /// which may be resolved by further messages.
+    /// Starts making frames, if all inputs have been seen. Call it again after an error, because
+    /// further messages may resolve it.
     ///
     /// # Errors
     /// [`LogError`]: a topic that the inputs or the settings name is not there (yet), or a
@@ -133,27 +133,26 @@ impl Listening {
     }
 }
 
-/// Second phase: frames, as images arrive.
+/// Second phase: makes frames as images arrive.
 pub struct LiveSource {
     assembly: Assembly,
     channels: BTreeMap<String, Arc<Channel>>,
 }
 
 impl LiveSource {
-    /// Returns the topics that are read; messages of others are ignored.
+    /// Returns the topics that are used; messages on others are ignored.
     pub fn topics(&self) -> impl Iterator<Item = &str> {
         self.channels.keys().map(String::as_str)
     }
 
-    /// Takes in a message, in CDR with its encapsulation header. One that cannot be decoded is
-    /// counted.
+    /// Adds a message, in CDR with its encapsulation header. One that cannot be decoded is counted.
     pub fn take(&mut self, topic: &str, data: &[u8]) {
         self.take_at(topic, data, UNKNOWN_TIME);
     }
 
-    /// Takes in a message as [`LiveSource::take`] with the time of its arrival, ns, of any clock that
-    /// does not go back and is not at 0: the time of messages without a stamp of their own, as those of
-    /// simple bumpers. Without it they have the stamp of the image before them.
+    /// Adds a message as [`LiveSource::take`] does, with its arrival time in ns, of any clock that
+    /// does not go back and is not at 0. It serves as the stamp of messages that have none, such as
+    /// those of simple bumpers. Without it they get the stamp of the image before them.
     pub fn take_at(&mut self, topic: &str, data: &[u8], arrival_ns: u64) {
         if let Some(channel) = self.channels.get(topic) {
             self.assembly.take(&Message { log_time: arrival_ns, ..message(channel, data) });
@@ -162,34 +161,34 @@ impl LiveSource {
 
     /// Returns the newest frame with all its images, if there is a new one.
     ///
-    /// A robot does not wait, unlike a log: an image with all its partners becomes a frame at once,
+    /// Unlike a log, a robot does not wait: an image with all its partners becomes a frame at once,
     /// and older ones are skipped and counted as `frames_skipped`. An image with missing partners
     /// is given up once [`InputSettings::reorder_frames`] newer ones wait.
     pub fn newest_frame(&mut self) -> Option<LogFrame> {
         self.assembly.newest_frame()
     }
 
-    /// Returns the reason for which no frame can be made of the images, if so.
+    /// Returns the reason why no frame can be made from the images, if there is one.
     pub fn misfit(&self) -> Option<LogError> {
         self.assembly.misfit().map(|misfit| self.assembly.plan.misfit(misfit.clone()))
     }
 
-    /// Returns the numbers of images skipped and lost so far, by reason.
+    /// Returns the numbers of skipped and lost images so far, by reason.
     pub fn counters(&self) -> &BTreeMap<&'static str, u64> {
         &self.assembly.tally.counters
     }
 
-    /// Returns the remarks about the messages, each one once.
+    /// Returns the remarks about the messages, each of them once.
     pub fn notes(&self) -> &[String] {
         &self.assembly.tally.notes
     }
 
-    /// Returns true if there is odometry: a topic, or transforms.
+    /// Returns true if there is odometry, as a topic or as transforms.
     pub fn has_odometry(&self) -> bool {
         self.assembly.plan.odom_frames.is_some()
     }
 
-    /// Returns the facts about the source; about the camera only after a frame.
+    /// Returns the properties of the source; those of the camera are known only after a frame.
     pub fn facts(&self) -> LogFacts {
         self.assembly.facts()
     }

@@ -1,4 +1,4 @@
-//! Second pass over a log: frames.
+//! Second pass over a log, which makes the frames.
 
 mod align;
 mod assemble;
@@ -30,12 +30,12 @@ use crate::{InputAccount, InputSettings, Inputs, Limits, LogError};
 
 /// Frame with the pose of the robot.
 pub struct LogFrame {
-    /// The frame. Its index counts the images (or scans) that make the frames, in the order of
-    /// their stamps from 1, unusable ones included.
+    /// The frame. Its index counts, from 1 in the order of their stamps, the images (or scans) from
+    /// which frames are made, including unusable ones.
     pub frame: Frame,
     /// Pose of the robot in the odometry frame; the identity without odometry.
     pub odom_from_robot: Isometry2<f64>,
-    /// True if the pose is a guess: there was a long gap in the odometry, or a jump.
+    /// True if the pose is a guess, after a long gap in the odometry or a jump.
     pub odom_stale: bool,
 }
 
@@ -45,14 +45,14 @@ impl AsRef<Frame> for LogFrame {
     }
 }
 
-/// Facts about a log.
+/// Properties of a log.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct LogFacts {
     /// Path of the file.
     #[serde(serialize_with = "path_text::serialize")]
     pub path: PathBuf,
-    /// Size of the file, bytes; of a compressed one unpacked, as the hash.
+    /// Size of the file, bytes; that of the unpacked file if it is compressed, like the hash.
     pub bytes: u64,
     /// SHA-256 of the file, hexadecimal.
     pub sha256: String,
@@ -66,10 +66,10 @@ pub struct LogFacts {
     pub odometry_topic: Option<String>,
     /// Topic of a laser scanner's scans.
     pub laser_topic: Option<String>,
-    /// Topics of the sensors that other crates define, by the names of their inputs.
+    /// Topics of the sensors that other crates define, keyed by the names of their inputs.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub sensor_topics: BTreeMap<&'static str, String>,
-    /// Topics of the further sources of obstacles, by the names of the sources.
+    /// Topics of the further obstacle sources, keyed by the names of the sources.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub obstacle_topics: BTreeMap<String, String>,
     /// Frame id of the images.
@@ -84,7 +84,7 @@ pub struct LogFacts {
     pub height: usize,
     /// Focal length along columns, pixels.
     pub focal_px: f64,
-    /// Distance of the right camera from the left one, m.
+    /// Baseline: distance of the right camera from the left one, m.
     pub baseline_m: Option<f64>,
     /// Height of the camera above the floor at the first frame, m.
     pub camera_height_m: f64,
@@ -92,7 +92,7 @@ pub struct LogFacts {
     pub camera_pitch_down_deg: f64,
     /// Roll of the camera, degrees; positive if its right side is raised.
     pub camera_roll_deg: f64,
-    /// Source of these three.
+    /// Source of the height, the pitch and the roll.
     pub camera_source: String,
 }
 
@@ -110,7 +110,7 @@ impl FrameSource {
     ///
     /// # Errors
     /// [`LogError`]: the file cannot be read, a calibration cannot be used, or the log lacks an
-    /// input or topic that `inputs` or `input` name.
+    /// input or topic that `inputs` or `input` requires.
     pub fn open(
         path: &Path,
         input: &InputSettings,
@@ -139,7 +139,7 @@ impl FrameSource {
             facts: LogFacts::default(),
             first: None,
         };
-        // Read in advance, because the facts about the camera are known after a frame only.
+        // Read in advance, because the properties of the camera are known only after a frame.
         source.first = source.advance();
         if let (None, Some(misfit)) = (&source.first, source.assembly.misfit()) {
             return Err(source.assembly.plan.misfit(misfit.clone()));
@@ -162,13 +162,13 @@ impl FrameSource {
         frame
     }
 
-    /// Checks at the end that the file is still as it was when it was opened.
+    /// Checks at the end that the file has not changed since it was opened.
     fn check_whole(&mut self) {
         let Assembly { plan, tally, .. } = &mut self.assembly;
         if self.walker.data_lost() && !plan.scan.data_lost {
             let notes = self.walker.notes();
             tally.lose("log_changed_while_read", || {
-                format!("the file was whole when it was opened and is not any more: {notes}")
+                format!("the file was undamaged when it was opened, but is damaged now: {notes}")
             });
         }
     }
@@ -183,12 +183,12 @@ impl FrameSource {
         }
     }
 
-    /// Returns the counters so far: damage of the file, images skipped and the reasons.
+    /// Returns the counters so far: damage of the file, and skipped images by reason.
     pub fn counters(&self) -> &BTreeMap<&'static str, u64> {
         &self.assembly.tally.counters
     }
 
-    /// Returns the remarks about the log, each one once.
+    /// Returns the remarks about the log, each of them once.
     pub fn notes(&self) -> &[String] {
         &self.assembly.tally.notes
     }
@@ -198,18 +198,18 @@ impl FrameSource {
         self.assembly.tally.lost
     }
 
-    /// Returns the remark about what was lost first since the log was opened, of which other losses may
-    /// be the consequence.
+    /// Returns the remark about the first loss since the log was opened, which may be the cause of
+    /// other losses.
     pub fn first_loss(&self) -> Option<&str> {
         self.assembly.tally.first_loss.as_deref()
     }
 
-    /// Returns true if there is odometry: a topic, or transforms.
+    /// Returns true if there is odometry, as a topic or as transforms.
     pub fn has_odometry(&self) -> bool {
         self.assembly.plan.odom_frames.is_some()
     }
 
-    /// Returns true if the log has odometry that cannot be used, and no other.
+    /// Returns true if the log only has odometry that cannot be used.
     pub fn lacks_usable_odometry(&self) -> bool {
         let plan = &self.assembly.plan;
         !plan.chosen.unused_odometry.is_empty() && plan.odom_frames.is_none()
@@ -220,7 +220,7 @@ impl FrameSource {
         &self.assembly.plan.account
     }
 
-    /// Returns the facts about the log.
+    /// Returns the properties of the log.
     pub fn facts(&self) -> &LogFacts {
         &self.facts
     }

@@ -17,12 +17,12 @@ pub(super) enum Mount {
     Fixed { pose: Isometry3<f64>, source: String },
 }
 
-/// Assumed height of the camera if nothing gives it and nothing depends on it, m.
+/// Height of the camera that is assumed if nothing gives it and nothing depends on it, m.
 const ASSUMED_HEIGHT_M: f64 = 1.2;
 
 impl Mount {
-    /// Returns the mount from the settings, else from tf; `None` with neither. A camera that looks
-    /// into a mirror is upright.
+    /// Returns the mount from the settings, or otherwise from tf; `None` with neither. A camera
+    /// that looks into a mirror is assumed to be upright.
     pub(super) fn find(
         scan: &Scan,
         camera: Option<&str>,
@@ -37,8 +37,8 @@ impl Mount {
         Some(Self::fixed(mount, source))
     }
 
-    /// Returns the mount of the sensor with this frame from tf; `None` if tf does not connect it with the
-    /// robot.
+    /// Returns the mount of the sensor with this frame id from tf; `None` if tf does not connect it
+    /// with the robot.
     pub(super) fn of_tf(scan: &Scan, frame: Option<&str>, input: &InputSettings) -> Option<Self> {
         let base = robot_frame(scan, input);
         let camera = frame.filter(|frame| scan.tf.connects(base, frame))?;
@@ -67,7 +67,7 @@ impl Mount {
         Self::Fixed { pose: Isometry3::identity(), source: source.into() }
     }
 
-    /// Returns a description of the source for people.
+    /// Returns a description of the source for users.
     pub(super) fn source(&self) -> String {
         match self {
             Self::Tf { base, camera } => format!("tf ({base} to {camera})"),
@@ -96,7 +96,7 @@ pub(crate) fn robot_frame<'a>(scan: &Scan, input: &'a InputSettings) -> &'a str 
 fn pose_of(mount: &MountSettings) -> Isometry3<f64> {
     let pitch = mount.pitch_down_deg.to_radians();
     let roll = mount.roll_deg.to_radians();
-    // Any lens will do, because only the pose of the camera is used.
+    // The lens does not matter, because only the pose of the camera is used.
     let any = Pinhole { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0, distortion: Default::default() };
     Camera::mounted(any, 1, 1, mount.height_m, pitch, roll).robot_from_camera
 }

@@ -23,7 +23,7 @@ pub(super) struct PartsWalker {
 }
 
 impl PartsWalker {
-    /// Starts with the first file.
+    /// Opens the first file.
     ///
     /// # Errors
     /// A file that cannot be opened or is not MCAP.
@@ -58,11 +58,11 @@ impl PartsWalker {
         faults.map(String::as_str).collect::<Vec<_>>().join("; ")
     }
 
-    /// Goes on to the next file; returns false if there is none. A file that vanished since the
-    /// first pass is a fault, and the walk goes on behind it.
+    /// Continues with the next file; returns false if there is none. A file that vanished since the
+    /// first pass is a fault, and reading continues behind it.
     fn open_next(&mut self) -> bool {
         let Some(part) = self.scan.parts.get(self.opened) else { return false };
-        // Counted before it is opened, so that a file that fails is not tried again.
+        // Incremented before the file is opened, so that one that fails is not tried again.
         self.opened += 1;
         match open_part(part, &self.limits) {
             Ok(walker) => {
@@ -80,7 +80,7 @@ impl PartsWalker {
 
 impl Messages for PartsWalker {
     fn next_message(&mut self) -> Option<Message<'_>> {
-        // An empty file is no end of the log.
+        // An empty file is not the end of the log.
         while !self.walker.advance() && self.open_next() {}
         self.walker.message()
     }

@@ -1,4 +1,4 @@
-//! Decisions before the first frame.
+//! Decisions that are made before the first frame.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -33,9 +33,9 @@ pub(super) struct Plan {
     pub(super) chosen: Chosen,
     /// Use of each topic, with reasons.
     pub(super) account: InputAccount,
-    /// True if messages have the times of their recording in place of their stamps.
+    /// True if messages have recording times in place of their stamps.
     pub(super) has_recording_times: bool,
-    /// Metres per unit of the depth images, where it is not that of the convention.
+    /// Metres per unit of the depth images, if it differs from the convention.
     pub(super) depth_unit_m: Option<f64>,
     pub(super) input: InputSettings,
     pub(super) limits: Limits,
@@ -44,17 +44,17 @@ pub(super) struct Plan {
     pub(super) lens: Option<Intrinsics>,
     depth_lens: Option<Intrinsics>,
     pub(super) baseline_m: Option<f64>,
-    /// Geometry of depth images that are disparities without one of their own.
+    /// Geometry for disparity images that do not contain it.
     pub(super) disparity: Option<StereoGeometry>,
-    /// Source of the odometry. `None`: no odometry. `Some(None)`: its topic. Else the two frames of
-    /// tf.
+    /// Source of the odometry. `None`: no odometry. `Some(None)`: its topic. Otherwise the two
+    /// frames of tf.
     pub(super) odom_frames: Option<Option<(String, String)>>,
-    /// Further sources of obstacles.
+    /// Further obstacle sources.
     pub(super) sources: Vec<PlannedSource>,
 }
 
 impl Plan {
-    /// Returns the topic of the images that make the frames.
+    /// Returns the topic of the images from which the frames are made.
     pub(super) fn primary(&self) -> &str {
         self.chosen.primary()
     }
@@ -64,7 +64,7 @@ impl Plan {
         self.chosen.has(topic) || self.sources.iter().any(|source| source.topic.topic == topic)
     }
 
-    /// Returns the topics of the further sources of obstacles, by the names of the sources.
+    /// Returns the topics of the further obstacle sources, keyed by the names of the sources.
     pub(super) fn obstacle_topics(&self) -> BTreeMap<String, String> {
         let topics = self.sources.iter().map(|source| &source.topic);
         topics.map(|source| (source.name.clone(), source.topic.clone())).collect()
@@ -83,7 +83,8 @@ impl Plan {
         own.as_ref().or(self.chosen.depth_info.as_ref())
     }
 
-    /// Returns the reason for which tf has no pose of the sensor that makes the frames: its clock.
+    /// Returns the reason why tf has no pose of the sensor from which the frames are made: its
+    /// clock.
     pub(super) fn mount_problem(&self) -> Option<Problem> {
         match &self.mount {
             Mount::Tf { base, camera } => {
@@ -93,13 +94,13 @@ impl Plan {
         }
     }
 
-    /// Returns true if depth comes beside another image.
+    /// Returns true if depth comes in addition to another image.
     pub(super) fn has_second_depth(&self) -> bool {
         self.chosen.colour.is_some() && self.chosen.depth.is_some()
     }
 
-    /// Returns true if the pixels of the images that make the frames are used, and not only their
-    /// stamps and their size.
+    /// Returns true if the pixels of the images from which the frames are made are used, and not
+    /// only their stamps and size.
     pub(super) fn reads_primary(&self) -> bool {
         self.inputs.uses(self.primary_input())
     }
@@ -118,13 +119,13 @@ impl Plan {
         }
     }
 
-    /// Returns true if laser scans or the points of a lidar make the frames, because the log has no
+    /// Returns true if the frames are made from laser scans or lidar points, because the log has no
     /// images.
     pub(super) fn is_of_scans(&self) -> bool {
         [Input::Laser, Input::POINTS].contains(&self.primary_input())
     }
 
-    /// Returns true if the points of a lidar make the frames.
+    /// Returns true if the frames are made from lidar points.
     pub(super) fn is_of_points(&self) -> bool {
         self.primary_input() == Input::POINTS
     }
@@ -142,7 +143,7 @@ impl Plan {
         let (Some(colour), Some(depth)) = (self.lens, self.depth_lens) else { return true };
         let a = colour.lens;
         let b = depth.lens;
-        // Calibrations of one camera may differ slightly: by 1 % in focal length, 2 px in the
+        // Calibrations of the same camera may differ slightly: by 1 % in focal length, 2 px in the
         // centre.
         (a.fx - b.fx).abs() <= 0.01 * a.fx
             && (a.fy - b.fy).abs() <= 0.01 * a.fy
@@ -178,8 +179,8 @@ pub(super) fn tally_of(scan: &Scan) -> Tally {
 /// Chooses topics, calibration and the source of the camera's pose.
 ///
 /// # Errors
-/// A calibration that cannot be used, and an input or topic that `inputs` or `input` name and the
-/// scan lacks.
+/// A calibration that cannot be used, and an input or topic that `inputs` or `input` requires but
+/// the scan lacks.
 pub(super) fn plan(
     scan: Arc<Scan>,
     input: &InputSettings,
@@ -208,7 +209,8 @@ pub(super) fn plan(
     let lens = match lens_of(&scan, chosen.colour.as_deref(), chosen.colour_info.as_deref(), false)
     {
         _ if chosen.colour.is_none() => depth_lens,
-        // As without any. On a robot a driver may be about to publish another one.
+        // Treated as a missing calibration. On a robot a driver may be about to publish another
+        // one.
         Err(why) if !is_metric(inputs) && is_uncalibrated(&why) && !scan.is_live() => {
             tally.note(format!("the calibration of the images is not used: {why}"));
             None
@@ -260,15 +262,15 @@ pub(super) fn plan(
     Ok(plan)
 }
 
-/// Returns the contents with the times that are used, and true if these are the times of recording:
-/// those that the settings ask for, and where the stamps of the frames never change.
+/// Returns the contents with the times that are used, and true if these are recording times:
+/// because the settings ask for them, or because the stamps of the frames never change.
 fn timed(
     scan: Arc<Scan>,
     input: &InputSettings,
     inputs: Inputs,
     tally: &mut Tally,
 ) -> Result<(Arc<Scan>, bool), LogError> {
-    // Messages that arrive live have no times of recording.
+    // Live messages have no recording times.
     if input.stamps == StampSource::Header || scan.is_live() {
         return Ok((scan, false));
     }
@@ -281,18 +283,19 @@ fn timed(
         let stamp = topic.stamps.first().copied().unwrap_or_default();
         tally.count("logs_without_stamps");
         tally.note(format!(
-            "the stamps of {primary} are not set: all are {stamp}; the times of recording are \
-             taken in place of all stamps (`stamps = \"recording\"` under [input])"
+            "the stamps of {primary} are not set: all are {stamp}; the times of recording are used \
+             instead of all stamps (`stamps = \"recording\"` under [input])"
         ));
     } else {
-        tally.note("the times of recording are taken in place of all stamps");
+        tally.note("the times of recording are used instead of all stamps");
     }
     Ok((Arc::new(scan.with_recording_times()), true))
 }
 
-/// Tells that there is no odometry, and which frame of tf the robot moves in all the same.
+/// Returns a message that there is no odometry, and in which frame of tf the robot nevertheless
+/// moves.
 fn no_odometry(plan: &Plan) -> String {
-    let at_rest = "no odometry: the robot is taken to be at rest".to_owned();
+    let at_rest = "no odometry: the robot is assumed to be at rest".to_owned();
     let tf = &plan.scan.tf;
     let robot = robot_frame(&plan.scan, &plan.input);
     let root = tf.root_of(robot);
@@ -307,8 +310,8 @@ fn no_odometry(plan: &Plan) -> String {
     )
 }
 
-/// Returns the unit of depth, where it is not that of the convention: that of the settings, else that
-/// which the camera tells in the log, else millimetres for grey images of 16 bits.
+/// Returns the unit of depth, if it differs from the convention: that of the settings, otherwise
+/// the one that the camera publishes in the log, otherwise millimetres for grey images of 16 bits.
 fn depth_unit_m(
     scan: &Scan,
     chosen: &Chosen,
@@ -329,8 +332,8 @@ fn depth_unit_m(
         let kind = kind_of(topic);
         let unit = match told {
             Some((from, unit_m)) => format!("{unit_m} m by {from}"),
-            None => "a millimetre unless the floor tells another, because no message does: \
-                     `depth_unit_m` under [input] sets it"
+            None => "a millimetre unless the floor shows another one, because no message states \
+                     it: `depth_unit_m` under [input] sets it"
                 .to_owned(),
         };
         tally.note(format!("{name} ({kind}) is taken for depth, in units of {unit}"));
@@ -341,7 +344,7 @@ fn depth_unit_m(
 /// Unit of depth by convention, m.
 const MILLIMETRE: f64 = 0.001;
 
-/// Tells which images could not be used and why, and which calibrations were found elsewhere.
+/// Notes which images could not be used and why, and which calibrations were found on other topics.
 fn note_choices(plan: &Plan, tally: &mut Tally) {
     for entry in &plan.account.topics {
         if entry.used_as.is_some() && (entry.problem.is_some() || has_far_calibration(plan, entry))
@@ -355,8 +358,8 @@ fn note_choices(plan: &Plan, tally: &mut Tally) {
     if let (Some(other), Some(used)) = (other, &plan.chosen.camera) {
         let camera = other.camera.as_deref().unwrap_or_default();
         tally.note(format!(
-            "the images of the camera {used} are used, those of {camera} are not: \
-             `camera = \"{camera}\"` under [input] takes them"
+            "the images of the camera {used} are used, those of {camera} are not: `camera = \
+             \"{camera}\"` under [input] takes them"
         ));
     }
     let odometry = plan.chosen.odometry.as_deref();
@@ -370,8 +373,7 @@ fn note_choices(plan: &Plan, tally: &mut Tally) {
     }
 }
 
-/// Returns true if the calibration of a topic stands in another place than usual, or is of another
-/// size.
+/// Returns true if the calibration of a topic is on another topic than usual, or of another size.
 fn has_far_calibration(plan: &Plan, entry: &TopicUse) -> bool {
     let found = plan.chosen.calibrations.get(&entry.topic).map(|found| &found.topic);
     entry.calibration.as_ref() != found
@@ -383,7 +385,7 @@ fn note_unread_images(plan: &Plan, tally: &mut Tally) {
         return;
     }
     for (name, topic) in &plan.scan.topics {
-        // Points of lidars are nothing that the pipeline would use in place of colour.
+        // The pipeline would not use lidar points in place of colour.
         if topic.kind != Type::PointCloud
             && !plan.chosen.has(name)
             && let Some(why) = unreadable(topic)
@@ -419,7 +421,7 @@ fn lens_of(
     })
 }
 
-/// Returns true for a pipeline whose places in metres need a calibration.
+/// Returns true for a pipeline whose positions in metres need a calibration.
 fn is_metric(inputs: Inputs) -> bool {
     inputs.requires(Input::Depth) || inputs.requires(Input::Right)
 }
@@ -429,15 +431,15 @@ fn is_uncalibrated(error: &LogError) -> bool {
     matches!(error, LogError::Calibration { source: CalibrationError::Uncalibrated, .. })
 }
 
-/// Returns true for images of disparities, which are those of the rectified left camera.
+/// Returns true for disparity images, which belong to the rectified left camera.
 fn is_disparity_image(topic: &Topic) -> bool {
     topic.kind == Type::DisparityImage
 }
 
-/// Returns the geometry of disparities that come without one; `None` for all other depth.
+/// Returns the geometry for disparities without their own; `None` for all other depth.
 ///
 /// # Errors
-/// A log that has no calibration for it.
+/// A log without the calibration that is needed for it.
 fn stereo_geometry(plan: &Plan) -> Result<Option<StereoGeometry>, LogError> {
     let (Some(settings), Some(depth)) = (plan.input.disparity, &plan.chosen.depth) else {
         return Ok(None);
@@ -458,7 +460,7 @@ fn stereo_geometry(plan: &Plan) -> Result<Option<StereoGeometry>, LogError> {
     Ok(Some(StereoGeometry { focal_px: lens.lens.fx, baseline_m }))
 }
 
-/// Returns the baseline of the right camera that the settings name, else of the only one.
+/// Returns the baseline of the right camera that the settings name, or otherwise of the only one.
 fn right_baseline_m(plan: &Plan) -> Option<f64> {
     if let Some(named) = &plan.chosen.right_info {
         return positive_baseline_m(plan.scan.infos.get(named)?);
@@ -500,12 +502,12 @@ fn check_calibration(plan: &Plan, tally: &mut Tally) -> Result<(), LogError> {
         return Err(missing(&plan.scan, wanted, hint.to_owned()));
     }
     if plan.lens.is_none() && !plan.is_of_scans() {
-        tally.note("no calibration: a lens with a view of 53 degrees is assumed");
+        tally.note("no calibration: a lens with a field of view of 53 degrees is assumed");
     }
     Ok(())
 }
 
-/// Baseline beyond which that of a pair on a robot has another unit, m.
+/// Maximum plausible baseline of a stereo pair on a robot, m; a larger one is in another unit.
 const LARGEST_BASELINE_M: f64 = 5.0;
 
 /// Returns the remedy for a right camera whose calibration has no positive baseline.
@@ -523,7 +525,7 @@ fn baseline_hint(plan: &Plan) -> String {
     )
 }
 
-/// Returns the source of the odometry: its topic, else the tf frames.
+/// Returns the source of the odometry: its topic, or otherwise the tf frames.
 fn odom_frames(chosen: &Chosen) -> Option<Option<(String, String)>> {
     if chosen.odometry.is_some() {
         return Some(None);
@@ -531,11 +533,11 @@ fn odom_frames(chosen: &Chosen) -> Option<Option<(String, String)>> {
     chosen.odom_frames.clone().map(Some)
 }
 
-/// Returns the mount from tf, the settings, or the floor in the first depth images.
+/// Returns the mount from tf, from the settings, or from the floor in the first depth images.
 fn find_mount(plan: &Plan, reread: Reread<'_>) -> Result<Mount, LogError> {
     let camera = plan.scan.frame_of(plan.primary());
     if plan.is_of_points() {
-        // The pose of [input.camera] is that of a camera, whose axes are others.
+        // The pose in [input.camera] is that of a camera, whose axes differ.
         return Mount::of_tf(&plan.scan, camera, &plan.input).ok_or_else(|| {
             let wanted = "pose of the lidar: tf does not connect it with the robot".to_owned();
             missing(&plan.scan, wanted, "; record /tf_static with its mount".to_owned())
@@ -560,13 +562,14 @@ fn find_mount(plan: &Plan, reread: Reread<'_>) -> Result<Mount, LogError> {
     }
 }
 
-/// Number of depth images by which the unit of depth is measured.
+/// Number of depth images from which the unit of depth is measured.
 const UNIT_FRAMES: usize = 3;
-/// Largest difference between the images, relative.
+/// Maximum ratio between the factors from different images.
 const SAME_FACTOR: f64 = 1.1;
 
-/// Returns the unit of depth by which the floor lies as far below the camera as the mount says, if it
-/// is clearly another one than that which is taken; `None` too where the floor does not tell.
+/// Returns the unit of depth with which the floor is at the distance below the camera that the
+/// mount implies, if it clearly differs from the assumed unit; `None` also if the floor does not
+/// determine it.
 fn measured_unit_m(plan: &Plan, reread: Reread<'_>) -> Result<Option<f64>, LogError> {
     let is_set = plan.input.depth_unit_m.is_some() || plan.input.disparity.is_some();
     let topic = plan.chosen.depth.as_ref().and_then(|topic| plan.scan.topics.get(topic));
@@ -574,7 +577,7 @@ fn measured_unit_m(plan: &Plan, reread: Reread<'_>) -> Result<Option<f64>, LogEr
     if is_set || is_disparity_image(topic) || topic.kind == Type::PointCloud {
         return Ok(None);
     }
-    // Every other source of the pose is measured by depth, or a guess.
+    // Every other source of the pose is measured from depth, or a guess.
     let is_known = match &plan.mount {
         Mount::Tf { .. } => true,
         Mount::Fixed { .. } => plan.input.mount().is_some(),
@@ -601,8 +604,8 @@ fn measured_unit_m(plan: &Plan, reread: Reread<'_>) -> Result<Option<f64>, LogEr
     Ok(Some(written_unit_m(unit_m * factors[factors.len() / 2])))
 }
 
-/// Takes a unit that was measured where nothing else tells it; tells it where the encoding has another
-/// one by convention, which only the user can overrule.
+/// Uses a measured unit if nothing else gives the unit. If the encoding implies another one by
+/// convention, it only reports it, because only the user can overrule that.
 fn take_measured_unit(plan: &mut Plan, unit_m: f64, tally: &mut Tally) {
     let name = plan.chosen.depth.clone().unwrap_or_default();
     let topic = plan.scan.topics.get(&name);
@@ -611,19 +614,20 @@ fn take_measured_unit(plan: &mut Plan, unit_m: f64, tally: &mut Tally) {
     if is_open {
         plan.depth_unit_m = Some(unit_m);
         tally.note(format!(
-            "the unit of {name} is taken to be {unit_m} m, by the floor and the height of the camera"
+            "the unit of {name} is assumed to be {unit_m} m, from the floor and the height of the \
+             camera"
         ));
         return;
     }
     tally.count("depth_unit_doubtful");
     tally.note(format!(
-        "the floor in {name} and the height of the camera ({}) say that its unit is {unit_m} m: set \
-         `depth_unit_m = {unit_m}` under [input]",
+        "according to the floor in {name} and the height of the camera ({}), its unit is {unit_m} \
+         m: set `depth_unit_m = {unit_m}` under [input]",
         plan.mount.source()
     ));
 }
 
-/// Returns a plan that reads depth alone.
+/// Returns a plan that reads only depth.
 fn depth_probe(plan: &Plan, mount: Mount) -> Plan {
     Plan {
         scan: Arc::clone(&plan.scan),

@@ -1,4 +1,4 @@
-//! Times of recording in place of the stamps of messages.
+//! Recording times in place of the stamps of messages.
 
 use tagalong_core::Stamp;
 
@@ -7,8 +7,8 @@ use crate::scan::Type;
 use crate::sensors::is_type;
 use crate::walk::Message;
 
-/// Returns a message with the time of its recording as its stamp; `None` for messages that do not
-/// begin with a header.
+/// Returns a message with its recording time as the stamp; `None` for messages that do not begin
+/// with a header.
 pub(super) fn restamp(message: &Message<'_>) -> Option<Vec<u8>> {
     let schema = &message.channel.schema_name;
     let has_header = match Type::of(schema) {
@@ -28,9 +28,9 @@ pub(super) fn restamp(message: &Message<'_>) -> Option<Vec<u8>> {
     }
     let mut data = message.data.to_vec();
     let time = Time::from(Stamp::from_nanos(message.log_time));
-    // The encapsulation, in ROS 1 a mark and the sequence number, stands in front of the stamp.
+    // The encapsulation header, or in ROS 1 a mark and the sequence number, precedes the stamp.
     let is_ros1 = data.starts_with(&ROS1_MARK);
-    // A message of video alone begins with the stamp itself.
+    // Only a video message begins with the stamp itself.
     let has_sequence = is_ros1 && !schema.ends_with("/CompressedVideo");
     let at = if has_sequence { 8 } else { 4 };
     let is_big_endian = !is_ros1 && data.get(1) == Some(&0);

@@ -1,4 +1,4 @@
-//! Account of the topics: what each one is used for, and why others are not used.
+//! Account of the topics: the use of each one, or the reason why it is not used.
 
 use std::fmt;
 
@@ -11,18 +11,19 @@ pub struct TopicUse {
     pub topic: String,
     /// Type and encoding of its messages.
     pub kind: String,
-    /// Camera, with its streams, that the topic belongs to; none for other sensors.
+    /// Camera, with its streams, to which the topic belongs; `None` for other sensors.
     pub camera: Option<String>,
-    /// Input that the messages are used as: `colour`, `depth`, `right`, `laser`, `odometry` and so
-    /// on; `None` if they are not used.
+    /// Input for which the messages are used: `colour`, `depth`, `right`, `laser`, `odometry` and
+    /// so on; `None` if they are not used.
     pub used_as: Option<String>,
     /// Calibration of the images.
     pub calibration: Option<String>,
-    /// Reason for which it is not used, or for which its use fails.
+    /// Reason why the topic is not used, or why its use fails.
     pub problem: Option<String>,
-    /// Input that it could be used as, if the problem were cured and nothing else serves as that.
+    /// Input for which the topic could be used if the problem were solved and no other topic were
+    /// used for it.
     pub could_be: Option<&'static str>,
-    /// Setting or action that cures the problem.
+    /// Setting or action that solves the problem.
     pub remedy: Option<String>,
 }
 
@@ -31,7 +32,7 @@ pub struct TopicUse {
 #[serde(transparent)]
 #[non_exhaustive]
 pub struct InputAccount {
-    /// Used topics first, each kind in the order of names.
+    /// Used topics first, each kind sorted by name.
     pub topics: Vec<TopicUse>,
 }
 
@@ -39,12 +40,12 @@ pub struct InputAccount {
 const ORDER: [&str; 6] = ["colour", "depth", "right", "odometry", "laser", "detections"];
 
 impl InputAccount {
-    /// Returns the topic that is used as an input.
+    /// Returns the topic that is used for an input.
     pub fn used_as(&self, input: &str) -> Option<&TopicUse> {
         self.topics.iter().find(|topic| topic.used_as.as_deref() == Some(input))
     }
 
-    /// Yields the topics that are not used, or not used with success.
+    /// Yields the topics that are not used, or whose use fails.
     pub fn problems(&self) -> impl Iterator<Item = &TopicUse> {
         self.topics.iter().filter(|topic| topic.problem.is_some())
     }
@@ -57,7 +58,7 @@ impl InputAccount {
         names
     }
 
-    /// Yields the topics that could serve as an input that is missing, if their problem were cured.
+    /// Yields the topics that could be used for a missing input if their problem were solved.
     pub fn curable(&self) -> impl Iterator<Item = &TopicUse> {
         self.topics.iter().filter(|topic| topic.could_be.is_some())
     }
@@ -85,7 +86,7 @@ impl fmt::Display for TopicUse {
         }
         match calibration {
             Some(calibration) => write!(f, "; calibration {calibration})")?,
-            // Without one, positions in metres are guesses.
+            // Without a calibration, positions in metres are guesses.
             None if used_as.is_some() && camera.is_some() => write!(f, "; no calibration)")?,
             None => write!(f, ")")?,
         }

@@ -1,24 +1,24 @@
-//! Search for the calibrations of images, wherever in the log they are.
+//! Search for the calibrations of images, anywhere in the log.
 
 use super::name::TopicName;
 use crate::camera_info::{CalibrationError, Intrinsics, intrinsics};
 use crate::scan::{Scan, Type, calibration_by_points};
 
-/// Relation of a calibration to the images that it was taken for.
+/// Relation of a calibration to the images for which it is used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Relation {
-    /// It stands where drivers publish it, or the settings name it.
+    /// It is on the topic on which drivers publish it, or the settings name it.
     Own,
-    /// It stands nearby, for the same stream of the same device.
+    /// It is on a nearby topic, for the same stream of the same device.
     SameStream,
-    /// It has the frame of the images.
+    /// It has the frame id of the images.
     SameFrame,
     /// It is the only one for images of that size.
     SameSize,
 }
 
 impl Relation {
-    /// Returns the relation as the end of a sentence; `None` where nothing needs to be said.
+    /// Returns the relation as the end of a sentence; `None` if there is nothing to say.
     pub(crate) fn words(self) -> Option<&'static str> {
         match self {
             Self::Own => None,
@@ -34,7 +34,7 @@ impl Relation {
 pub(crate) struct FoundCalibration {
     pub(crate) topic: String,
     pub(crate) relation: Relation,
-    /// A nearer one, with the reason for which it cannot be used.
+    /// A nearer calibration, with the reason why it cannot be used.
     pub(crate) instead_of: Option<String>,
 }
 
@@ -44,8 +44,8 @@ impl FoundCalibration {
     }
 }
 
-/// Returns the calibration of an image topic: the nearest one that can be used for its images, else
-/// the nearest one.
+/// Returns the calibration of an image topic: the nearest one that can be used for its images, or
+/// otherwise the nearest one.
 pub(crate) fn calibration_of(
     scan: &Scan,
     image: &str,
@@ -65,7 +65,7 @@ pub(crate) fn calibration_of(
     found.into_iter().next()
 }
 
-/// Returns the reason for which a calibration cannot be used for images; `None` for one that can.
+/// Returns the reason why a calibration cannot be used for images; `None` if it can.
 fn unfit(scan: &Scan, image: &str, topic: &str, is_disparity: bool) -> Option<String> {
     match intrinsics_of(scan, image, topic, is_disparity) {
         Err(why) => Some(format!("{topic}: {why}")),
@@ -73,13 +73,13 @@ fn unfit(scan: &Scan, image: &str, topic: &str, is_disparity: bool) -> Option<St
     }
 }
 
-/// Returns the calibrations that may be those of an image topic, the nearest first.
+/// Returns the calibrations that may belong to an image topic, the nearest first.
 fn candidates(scan: &Scan, image: &str, is_disparity: bool) -> Vec<FoundCalibration> {
     let mut likely: Vec<(String, Relation)> = Vec::new();
     let folder = folder_of(image);
     likely.push((format!("{folder}/camera_info"), Relation::Own));
     let kind = scan.topics.get(image).map(|topic| topic.kind);
-    // Disparities are those of the left camera, and its calibration stands beside its images.
+    // Disparities are those of the left camera, whose calibration is beside its images.
     if is_disparity || kind == Some(Type::DisparityImage) {
         likely.push((format!("{folder}/left/camera_info"), Relation::Own));
     }
@@ -89,7 +89,7 @@ fn candidates(scan: &Scan, image: &str, is_disparity: bool) -> Vec<FoundCalibrat
     let name = TopicName::of(image);
     let mut others: Vec<(usize, &String)> =
         scan.infos.keys().map(|info| (common_folders(image, info), info)).collect();
-    // The nearest folder first; of equal ones the first by name.
+    // The one in the nearest namespace first; of equally near ones the first by name.
     others.sort_by_key(|(common, info)| (std::cmp::Reverse(*common), *info));
     for (_, info) in others.iter().filter(|(common, _)| *common > 0) {
         let other = TopicName::of(info);
@@ -100,7 +100,7 @@ fn candidates(scan: &Scan, image: &str, is_disparity: bool) -> Vec<FoundCalibrat
     let frame = scan.frame_of(image).filter(|frame| !frame.is_empty());
     for (_, info) in &others {
         let is_same = frame.is_some_and(|frame| scan.infos[*info].header.frame_id == frame);
-        // Recordings of some cameras have one frame for all streams.
+        // Recordings of some cameras have the same frame id for all streams.
         if is_same && !name.contradicts(&TopicName::of(info)) {
             likely.push(((*info).clone(), Relation::SameFrame));
         }
@@ -120,7 +120,7 @@ fn candidates(scan: &Scan, image: &str, is_disparity: bool) -> Vec<FoundCalibrat
     found
 }
 
-/// Returns the only calibration for images of this size that stands beside no images of its own.
+/// Returns the only calibration for images of this size that does not belong to other images.
 fn only_of_size(scan: &Scan, image: &str) -> Option<String> {
     let size = scan.topics.get(image)?.size?;
     let name = TopicName::of(image);
@@ -134,7 +134,7 @@ fn only_of_size(scan: &Scan, image: &str) -> Option<String> {
     names.next().is_none().then_some(only)
 }
 
-/// Whether a calibration stands beside other images than these.
+/// Returns true if a calibration belongs to other images than these.
 fn has_other_images(scan: &Scan, image: &str, info: &str) -> bool {
     scan.topics.iter().any(|(other, topic)| {
         let is_image = topic.pixels.is_some() && other != image;
@@ -142,28 +142,28 @@ fn has_other_images(scan: &Scan, image: &str, info: &str) -> bool {
     })
 }
 
-/// Returns the folder of an image topic, without the endings of transports.
+/// Returns the namespace of an image topic, without the suffixes of transports.
 fn folder_of(image: &str) -> &str {
     let base = image.trim_end_matches("/compressedDepth").trim_end_matches("/compressed");
     base.rsplit_once('/').map_or("", |(folder, _)| folder)
 }
 
-/// Returns the number of folders at the start that two topics share.
+/// Returns the number of leading namespaces that two topics share.
 pub(super) fn common_folders(a: &str, b: &str) -> usize {
     folders(a).zip(folders(b)).take_while(|(a, b)| a == b).count()
 }
 
-/// Returns the folders of a topic, without its last name.
+/// Returns the namespaces of a topic, without its last name.
 pub(super) fn folders(topic: &str) -> impl Iterator<Item = &str> {
     let (path, _) = topic.trim_matches('/').rsplit_once('/').unwrap_or_default();
     path.split('/').filter(move |_| !path.is_empty())
 }
 
-/// Returns the lens of an image topic by a calibration, scaled to the size of the images where a
-/// whole number explains the difference.
+/// Returns the lens of an image topic from a calibration, scaled to the size of the images if an
+/// integer factor explains the difference.
 ///
 /// # Errors
-/// A calibration that cannot be used. A wrong size is no error here.
+/// A calibration that cannot be used. A wrong size is not an error here.
 pub(crate) fn intrinsics_of(
     scan: &Scan,
     image: &str,
@@ -174,7 +174,7 @@ pub(crate) fn intrinsics_of(
     let topic = scan.topics.get(image);
     let is_disparity =
         is_disparity || topic.is_some_and(|topic| topic.kind == Type::DisparityImage);
-    // Of other images, the name of the topic is the only sign that they are rectified.
+    // For other images, the topic name is the only indication that they are rectified.
     let lens = intrinsics(message, image.contains("rect") || is_disparity)?;
     let size = topic.and_then(|topic| topic.size);
     Ok(match size {
@@ -183,7 +183,7 @@ pub(crate) fn intrinsics_of(
     })
 }
 
-/// Returns the sizes of a calibration and of the images that it does not fit.
+/// Returns the error for a calibration that does not fit the images, with both sizes.
 pub(crate) fn misfit(scan: &Scan, image: &str, lens: &Intrinsics) -> Option<CalibrationError> {
     let (width, height) = scan.topics.get(image)?.size?;
     crate::camera_info::check_size(lens, width as usize, height as usize).err()

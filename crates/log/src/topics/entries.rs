@@ -1,4 +1,4 @@
-//! Reasons for which topics are used or not.
+//! Reasons why topics are used or not.
 
 use super::account::{InputAccount, TopicUse};
 use super::foreign::{Foreign, foreign};
@@ -13,7 +13,7 @@ use crate::scan::{Scan, Topic, Type};
 use crate::sensors::{SENSORS, SensorType};
 use crate::{Input, InputSettings, Inputs};
 
-/// Reason for images of a rig that is not chosen.
+/// Reason for images of a rig that was not chosen.
 pub(super) const OTHER_CAMERA: &str = "it is of another camera";
 
 /// Returns the account of all images, scans, detections and odometry.
@@ -30,7 +30,7 @@ pub(super) fn account(
     account
 }
 
-/// Everything that the reasons depend on.
+/// Everything on which the reasons depend.
 struct Judge<'a> {
     scan: &'a Scan,
     input: &'a InputSettings,
@@ -43,10 +43,10 @@ struct Judge<'a> {
 type Reason = (String, Option<String>);
 
 impl Judge<'_> {
-    /// Returns the entry of a topic; `None` for those that are no sensors.
+    /// Returns the entry of a topic; `None` for topics that are not sensors.
     fn entry(&self, name: &str, topic: &Topic) -> Option<TopicUse> {
         let sensor = SENSORS.iter().find(|sensor| is_of(sensor, topic));
-        // Where depth is wanted and none is there, what matters is why these points are none.
+        // If depth is wanted and missing, the important reason is why these points are not depth.
         let lacks_depth = self.inputs.uses(Input::Depth) && self.chosen.depth.is_none();
         let sensor = sensor.filter(|_| !(topic.is_lidar() && lacks_depth));
         let is_known = is_image(topic) || is_odometry(topic) || sensor.is_some();
@@ -89,8 +89,8 @@ impl Judge<'_> {
         })
     }
 
-    /// Returns the input that a topic could serve as, if its problem were cured and no other topic
-    /// does so.
+    /// Returns the input for which a topic could be used, if its problem were solved and no other
+    /// topic were used for it.
     fn could_be(&self, name: &str, topic: &Topic) -> Option<&'static str> {
         let Chosen { colour, depth, depth_problem, odometry, .. } = self.chosen;
         let Chosen { odom_frames, unused_odometry, .. } = self.chosen;
@@ -115,7 +115,7 @@ impl Judge<'_> {
         (unreadable(topic).is_some() && is_free && !is_scan).then_some("colour")
     }
 
-    /// Returns the first of the inputs of messages of another type that nothing else serves as.
+    /// Returns the first of the inputs of messages of another type for which nothing else is used.
     fn foreign_could_be(&self, foreign: &Foreign, topic: &Topic) -> Option<&'static str> {
         let Chosen { colour, depth, depth_problem, .. } = self.chosen;
         for input in foreign.could_be {
@@ -137,7 +137,7 @@ impl Judge<'_> {
         format!("{}{}", kind_of(topic), size.unwrap_or_default())
     }
 
-    /// Returns the input that a topic is used as.
+    /// Returns the input for which a topic is used.
     fn use_of(&self, name: &str) -> Option<String> {
         let Chosen { colour, depth, right, odometry, sensors, .. } = self.chosen;
         let images =
@@ -156,7 +156,7 @@ impl Judge<'_> {
         Some(format!("source of obstacles `{}`", source.name))
     }
 
-    /// Returns the reason for which a topic that is chosen gives nothing.
+    /// Returns the reason why a chosen topic gives no data.
     fn failure(&self, name: &str) -> Option<Reason> {
         if let Some(fault) = self.scan.topics.get(name).and_then(Topic::impossible) {
             return Some((
@@ -233,7 +233,7 @@ impl Judge<'_> {
         (format!("{used} is used"), Some(remedy))
     }
 
-    /// Returns the reason for which depth is left out.
+    /// Returns the reason why depth is left out.
     fn unused_depth(&self, name: &str) -> Reason {
         let colour = self.chosen.colour.as_deref().unwrap_or_default();
         match depth_problem(self.scan, self.input, colour, name) {
@@ -277,7 +277,10 @@ impl Judge<'_> {
         let is_named = self.input.topic_of(sensor.input).is_some();
         if sensor.rank.is_none() && !is_named {
             let remedy = recorded_remedy(&key, name);
-            return ("recorded detections are read if they are named".to_owned(), Some(remedy));
+            return (
+                "recorded detections are read only if their topic is named".to_owned(),
+                Some(remedy),
+            );
         }
         if !self.inputs.uses(sensor.input) {
             return (format!("the pipeline uses no {}", sensor.wanted), None);
@@ -289,8 +292,8 @@ impl Judge<'_> {
 /// Topic that the built-in config `recorded` names.
 const RECORDED_TOPIC: &str = "/detections";
 
-/// Returns the command that uses recorded detections, with the config that it takes for a topic that the
-/// built-in config does not name.
+/// Returns the command that uses recorded detections, with the config that is needed for a topic
+/// other than that of the built-in config.
 fn recorded_remedy(key: &str, name: &str) -> String {
     if name == RECORDED_TOPIC {
         return "`tagalong run recorded LOG` uses them".to_owned();
@@ -302,12 +305,12 @@ fn recorded_remedy(key: &str, name: &str) -> String {
 }
 
 fn is_scaled(info: &crate::msgs::CameraInfo, size: (u32, u32)) -> bool {
-    // Binning and regions explain other sizes.
+    // Binning and regions of interest explain other sizes.
     let is_plain = info.binning_x <= 1 && info.binning_y <= 1 && info.roi.width == 0;
     is_plain && (info.width, info.height) != size
 }
 
-/// Returns a reason apart from its remedy.
+/// Splits a reason from its remedy.
 fn with_remedy(why: String) -> Reason {
     match why.split_once(": ") {
         Some((why, remedy)) => (why.to_owned(), Some(remedy.to_owned())),
@@ -315,11 +318,11 @@ fn with_remedy(why: String) -> Reason {
     }
 }
 
-/// Returns the reason of a topic without one message that can be read.
+/// Returns the reason for a topic without any readable message.
 fn empty(topic: &Topic) -> Option<Reason> {
     if topic.count == 0 {
         return Some(("no message was recorded".to_owned(), None));
     }
     let is_lost = topic.undecodable == topic.count;
-    is_lost.then(|| (format!("its {} messages are not as their type says", topic.count), None))
+    is_lost.then(|| (format!("its {} messages do not match their type", topic.count), None))
 }

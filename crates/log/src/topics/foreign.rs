@@ -1,6 +1,7 @@
-//! Message types of sensors that are not read: their contents, and the topic to record in their place.
+//! Message types of sensors that are not read: their contents, and the topic to record instead.
 //!
-//! Without them a log of colour images and packets of a lidar would be one of "colour alone".
+//! Without them, a log of colour images and lidar packets would be reported as one of "colour
+//! alone".
 
 use super::kinds::unread_encoding;
 use crate::images::VIDEO_REMEDY;
@@ -9,17 +10,17 @@ use crate::scan::{Topic, Type};
 /// Messages of a sensor that are not read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Foreign {
-    /// Contents of the messages, and that they are not read.
+    /// Contents of the messages, and the statement that they are not read.
     pub(super) why: String,
-    /// Topic to record in their place.
+    /// Topic to record instead.
     pub(super) remedy: String,
-    /// Inputs that the recorded topic could be, the best first.
+    /// Inputs for which the recorded topic could be used, the best first.
     pub(super) could_be: &'static [&'static str],
 }
 
 /// Types with the same contents and the same remedy.
 struct Group {
-    /// Package and name of each type, as ROS 1 writes them; `*` stands for any package.
+    /// Package and name of each type, written as in ROS 1; `*` stands for any package.
     types: &'static [&'static str],
     contents: &'static str,
     remedy: &'static str,
@@ -165,7 +166,7 @@ const GROUPS: [Group; 12] = [
     },
 ];
 
-/// Types of `sensor_msgs` that may stand within others, and the words for them.
+/// Types of `sensor_msgs` that may be contained in others, and the words for them.
 const PARTS: [(&str, &str); 5] = [
     ("Image", "images"),
     ("CompressedImage", "images"),
@@ -174,7 +175,7 @@ const PARTS: [(&str, &str); 5] = [
     ("MultiEchoLaserScan", "scans"),
 ];
 
-/// Packages whose messages hold pictures that no sensor took: the textures of markers.
+/// Packages whose messages contain images that no sensor took, such as textures of markers.
 const DRAWN: &str = "visualization_msgs";
 
 /// Returns the contents of a topic of a sensor whose type is not read; `None` for all other topics.
@@ -209,15 +210,15 @@ impl Group {
     }
 }
 
-/// Returns package and name of a type, written as ROS 1, ROS 2 or Protobuf do.
+/// Returns package and name of a type, written as in ROS 1, ROS 2 or Protobuf.
 fn parts_of(schema: &str) -> (&str, &str) {
     let package = schema.split(['/', '.']).next().unwrap_or_default();
     let name = schema.rsplit(['/', '.']).next().unwrap_or_default();
     (package, name)
 }
 
-/// Returns the first type of `sensor_msgs` with images, points or scans that the messages of a type
-/// contain, by its definition.
+/// Returns the first type of `sensor_msgs` with images, points or scans that is contained in the
+/// messages of a type, according to its definition.
 pub(crate) fn part_of(definition: &str) -> Option<&'static str> {
     let mut found = None;
     for line in definition.lines() {

@@ -1,4 +1,4 @@
-//! Kinds of topics, as far as types, encodings and first messages tell them, and their ranks by name.
+//! Kinds of topics, as shown by types, encodings and first messages, and their ranks by name.
 
 use tagalong_core::Input;
 
@@ -12,19 +12,19 @@ pub(super) fn is_picture(topic: &Topic) -> bool {
     matches!(topic.kind, Type::Image | Type::CompressedImage | Type::Video)
 }
 
-/// Returns true for images, those of disparity and the points of depth cameras included.
+/// Returns true for images, including disparity images and the points of depth cameras.
 pub(super) fn is_image(topic: &Topic) -> bool {
     let is_cloud = topic.kind == Type::PointCloud && !topic.is_lidar();
     is_picture(topic) || topic.kind == Type::DisparityImage || is_cloud
 }
 
-/// Returns true for pictures that can be read, as far as that is known before the first one.
+/// Returns true for pictures that can be read, as far as is known before the first one.
 pub(super) fn is_usable_picture(topic: &Topic) -> bool {
     is_picture(topic) && (topic.content == Content::Picture || topic.pixels.is_none())
 }
 
-/// Returns true for images that can be read as depth if the settings name them. Grey images of 16
-/// bits are among them, and those of infrared: what the user names is obeyed.
+/// Returns true for images that can be read as depth if the settings name them. They include grey
+/// images of 16 bits and infrared ones, because the choice of the user has priority.
 pub(super) fn is_usable_depth(topic: &Topic, input: &InputSettings) -> bool {
     let is_disparity = input.disparity.is_some() && disparity_rank("disparity", topic).is_some();
     let may_be = topic.is_deep_grey || topic.is_other_stream;
@@ -32,12 +32,13 @@ pub(super) fn is_usable_depth(topic: &Topic, input: &InputSettings) -> bool {
     is_image(topic) && (is_depth || is_disparity)
 }
 
-/// Returns true for images whose pixels may be depth or disparities, by a setting at most.
+/// Returns true for images whose pixels may be depth or disparities, if necessary after a change of
+/// settings.
 pub(super) fn could_be_depth(topic: &Topic) -> bool {
     is_image(topic) && (topic.content != Content::Picture || remedy_as_depth(topic).is_some())
 }
 
-/// Returns the setting that makes depth of images that look like others.
+/// Returns the setting with which images of another appearance are read as depth.
 pub(super) fn remedy_as_depth(topic: &Topic) -> Option<&'static str> {
     match topic.pixels.as_deref()? {
         _ if topic.is_deep_grey || topic.is_other_stream => {
@@ -57,7 +58,7 @@ pub(crate) fn kind_of(topic: &Topic) -> String {
     }
 }
 
-/// Names of messages with images or scans, whatever their package and encoding.
+/// Names of messages with images or scans, in any package and encoding.
 const SENSOR_MESSAGES: [&str; 5] =
     ["Image", "RawImage", "CompressedImage", "DisparityImage", "LaserScan"];
 /// Names of messages with video.
@@ -66,14 +67,14 @@ const VIDEO_MESSAGES: [&str; 3] = ["CompressedVideo", "FFMPEGPacket", "H264Packe
 const NO_KEY_REMEDY: &str = "no key picture with its parameters is in the log, and those after it refer to \
                              one: record from the start of the stream, or let the encoder repeat them";
 
-/// Reason for pictures of depth, as coloured for people to look at, and their remedy.
-const DEPTH_AS_PICTURE: &str = "its name says depth, and its pixels are a picture, from which no distances \
-                                can be read";
+/// Reason for pictures of depth, coloured for display, and their remedy.
+const DEPTH_AS_PICTURE: &str = "its name says depth, but its pixels are a picture, which has no \
+                                distances";
 const DEPTH_AS_PICTURE_REMEDY: &str = "record the raw topic, or its compressedDepth";
 
 /// Remedy for depth as JPEG.
-const JPEG_REMEDY: &str = "JPEG keeps 8 of the 16 bits of depth, so that no distances are left: \
-                           record the raw topic, or its compressedDepth";
+const JPEG_REMEDY: &str = "JPEG keeps 8 of the 16 bits of depth, so the distances are lost: record \
+                           the raw topic, or its compressedDepth";
 /// Remedy for grey images of 16 bits in a codec that is used for depth.
 const DEEP_REMEDY: &str = "grey images of 16 bits are no colour images; they could be depth: if \
                            they are, name the topic as `depth_topic` under [input], with its unit \
@@ -88,8 +89,8 @@ fn message_name(topic: &Topic) -> &str {
     topic.schema.rsplit(['/', '.']).next().unwrap_or_default()
 }
 
-/// Returns the reason for which images or scans of a topic cannot be read, with the remedy; `None`
-/// for those that can, and for all other topics.
+/// Returns the reason why images or scans of a topic cannot be read, with the remedy; `None` if
+/// they can, and for all other topics.
 pub(crate) fn unreadable(topic: &Topic) -> Option<String> {
     let name = message_name(topic);
     let is_decoded = topic.kind == Type::Video && topic.pixels.as_deref() == Some(H264);
@@ -124,20 +125,21 @@ pub(crate) fn unreadable(topic: &Topic) -> Option<String> {
     }
 }
 
-/// Returns the reason for which messages in an encoding cannot be read, whatever their type, and the
+/// Returns the reason why messages in an encoding cannot be read, whatever their type, and the
 /// remedy.
 pub(super) fn unread_encoding(encoding: &str) -> Option<(String, &'static str)> {
     if matches!(encoding, "cdr" | "ros1") {
         return None;
     }
     let why = format!(
-        "its messages are in `{encoding}`, and those of ROS 2 (`cdr`) and ROS 1 (`ros1`) are read"
+        "its messages are in `{encoding}`, but only those of ROS 2 (`cdr`) and ROS 1 (`ros1`) can \
+         be read"
     );
     Some((why, "record with `ros2 bag record`, or convert the log"))
 }
 
-/// Returns the reason and the remedy for pictures or video under a name of depth; `None` for all other
-/// topics, and for those that a setting makes disparities of.
+/// Returns the reason and the remedy for pictures or video under a name of depth; `None` for all
+/// other topics, and for those that a setting declares to be disparities.
 pub(super) fn depth_as_picture(name: &str, topic: &Topic) -> Option<(&'static str, &'static str)> {
     let is_picture = topic.content == Content::Picture && !topic.is_deep_grey;
     let is_named = TopicName::of(name).stream == Stream::Depth;
@@ -155,7 +157,7 @@ fn is_video(topic: &Topic) -> bool {
     topic.kind == Type::Video || VIDEO_MESSAGES.contains(&name) || is_theora
 }
 
-/// Names of messages with detections of objects or people, whatever their package.
+/// Names of messages with detections of objects or people, in any package.
 const DETECTION_MESSAGES: [&str; 22] = [
     "BoundingBoxArray",
     "BoundingBoxes",
@@ -181,8 +183,8 @@ const DETECTION_MESSAGES: [&str; 22] = [
     "YoloResult",
 ];
 
-/// Returns the reason for which detections of a topic cannot be read; `None` for those that can, and
-/// for all other topics.
+/// Returns the reason why detections of a topic cannot be read; `None` if they can, and for all
+/// other topics.
 pub(super) fn unread_detections(topic: &Topic) -> Option<String> {
     if topic.kind != Type::Other || !DETECTION_MESSAGES.contains(&message_name(topic)) {
         return None;
@@ -210,8 +212,8 @@ pub(super) fn is_odometry(topic: &Topic) -> bool {
     topic.kind == Type::Odometry
 }
 
-/// Returns true for a topic with messages of this sensor, in an encoding that can be read. Points are
-/// those of a lidar only where they are not those of a camera.
+/// Returns true for a topic with messages of this sensor, in an encoding that can be read. Points
+/// count as those of a lidar only if they are not those of a camera.
 pub(super) fn is_of(sensor: &SensorType, topic: &Topic) -> bool {
     let is_sensor =
         topic.kind == Type::Sensor || topic.kind == Type::PointCloud && topic.is_lidar();
@@ -231,7 +233,7 @@ pub(super) fn colour_rank(name: &str, topic: &Topic) -> Option<i32> {
         return None;
     }
     let name = &name.to_lowercase();
-    // A name for colour decides before one for a side, and before an uncompressed image.
+    // A name for colour has priority over one for a side, and over an uncompressed image.
     let mut rank = -2 * i32::from(has(name, &["rear", "back"]));
     rank += 8 * i32::from(has(name, &["color", "colour", "rgb"]));
     rank += 4 * i32::from(has(name, &["left", "front", "rect"]));
@@ -241,7 +243,7 @@ pub(super) fn colour_rank(name: &str, topic: &Topic) -> Option<i32> {
     ));
     rank -= 6 * i32::from(has(name, &["annotated", "overlay", "result", "detection"]));
     rank += i32::from(topic.kind == Type::Image);
-    // Its pictures are coarser than those of the same camera in a topic beside it.
+    // Video is coarser than the images of the same camera on a topic beside it.
     rank -= i32::from(topic.kind == Type::Video);
     Some(rank)
 }
@@ -257,7 +259,7 @@ pub(super) fn depth_rank(name: &str, topic: &Topic) -> Option<i32> {
     rank += 4 * i32::from(name.contains("depth"));
     rank -= 6 * i32::from(has(name, &["infra", "/ir", "confidence", "debug", "disparity"]));
     rank += i32::from(topic.kind == Type::Image);
-    // The points are those of the images, in many times the bytes.
+    // Points contain the same depth as the images, in many times the bytes.
     rank -= 10 * i32::from(topic.kind == Type::PointCloud);
     Some(rank)
 }

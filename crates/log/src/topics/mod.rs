@@ -1,8 +1,9 @@
-//! Choice of the topics of a log: one decision, with a reason for each topic.
+//! Choice of the topics of a log, in one decision with a reason for each topic.
 //!
-//! Images are grouped into rigs, the streams of one device, before anything is ranked; a pipeline gets
-//! the images of one rig unless the settings name others. The [account](InputAccount) says of each
-//! image, scan, detection and odometry topic what it is used for, or why it is not.
+//! Images are grouped into rigs, the streams of one device, before anything is ranked; a pipeline
+//! gets the images of one rig unless the settings name others. For each topic with images, scans,
+//! detections or odometry, the [account](InputAccount) contains its use, or the reason why it is
+//! not used.
 
 mod account;
 mod calibration;
@@ -57,17 +58,17 @@ pub(crate) struct Chosen {
     pub(crate) odometry: Option<String>,
     /// Relation of each calibration to its images, by the topic of the images.
     pub(crate) calibrations: BTreeMap<String, FoundCalibration>,
-    /// Camera that the images belong to.
+    /// Camera to which the images belong.
     pub(crate) camera: Option<String>,
-    /// Reason for which the depth images cannot be used.
+    /// Reason why the depth images cannot be used.
     pub(crate) depth_problem: Option<Problem>,
-    /// Frames of tf that give the odometry where no topic does: odometry frame and robot frame.
+    /// Frames of tf that give the odometry if no topic does: odometry frame and robot frame.
     pub(crate) odom_frames: Option<(String, String)>,
-    /// Odometry that would have been chosen and cannot be used, with the reasons.
+    /// Odometry that would have been chosen but cannot be used, with the reasons.
     pub(crate) unused_odometry: Vec<(String, Problem)>,
-    /// Topics of the sensors beside the images.
+    /// Topics of the sensors other than cameras.
     pub(crate) sensors: BTreeMap<Input, String>,
-    /// Reasons for which chosen sensors give nothing.
+    /// Reasons why chosen sensors give no data.
     pub(crate) sensor_problems: BTreeMap<Input, Problem>,
     /// Topics of further laser scanners on the robot.
     pub(crate) further_scans: Vec<String>,
@@ -86,14 +87,14 @@ impl Chosen {
             .any(|chosen| chosen == topic)
     }
 
-    /// Returns the topic whose messages make the frames; empty without any.
+    /// Returns the topic from whose messages the frames are made; empty without one.
     pub(crate) fn primary(&self) -> &str {
         let images = self.colour.as_ref().or(self.depth.as_ref());
         let scans = self.sensor(Input::Laser).or(self.sensor(Input::POINTS));
         images.map(String::as_str).or(scans).unwrap_or_default()
     }
 
-    /// Returns the topic of a sensor beside the images.
+    /// Returns the topic of a sensor other than a camera.
     pub(crate) fn sensor(&self, input: Input) -> Option<&str> {
         self.sensors.get(&input).map(String::as_str)
     }
@@ -112,10 +113,11 @@ pub(crate) struct Decision {
     pub(crate) account: InputAccount,
 }
 
-/// Chooses topics as named in the settings, else by device, type, encoding and name. A topic of an
-/// unused input is not chosen, as if the log did not have it, with one exception: frames are numbered
-/// and timed by the images of the colour topic, and without it by those of the depth topic. In a log
-/// without images they are laser scans, and without these the points of a lidar.
+/// Chooses the topics that the settings name, and otherwise by device, type, encoding and name. A
+/// topic of an unused input is not chosen, as if the log did not have it, with one exception:
+/// frames are numbered and timed by the images of the colour topic, or without it by those of the
+/// depth topic. In a log without images the laser scans take this role, and without these the
+/// points of a lidar.
 ///
 /// # Errors
 /// [`LogError::Missing`] for a named topic or camera that is not there, and for required inputs that
@@ -131,13 +133,13 @@ pub(crate) fn decide(
     Ok(Decision { chosen, account })
 }
 
-/// Returns the account of a log of which no frames can be made.
+/// Returns the account of a log from which no frames can be made.
 pub(crate) fn account_of(scan: &Scan, input: &InputSettings) -> InputAccount {
     let chosen = choose(scan, input, Inputs::ANY).unwrap_or_default();
     entries::account(scan, input, Inputs::ANY, &chosen)
 }
 
-/// Chooses topics without a check that all required ones are there.
+/// Chooses topics without checking that all required ones exist.
 ///
 /// # Errors
 /// A named topic or camera that is not there.
@@ -146,7 +148,7 @@ pub(crate) fn choose(
     input: &InputSettings,
     inputs: Inputs,
 ) -> Result<Chosen, LogError> {
-    // Images that come more often than points would show each of them several times.
+    // If images are more frequent than points, they would show each point several times.
     let images = if inputs.are_of_points() {
         Default::default()
     } else {
@@ -204,7 +206,8 @@ pub(crate) fn choose(
     Ok(chosen)
 }
 
-/// Chooses the calibration of a stream of images: the named one, or else the nearest.
+/// Chooses the calibration of a stream of images: the one that the settings name, or otherwise the
+/// nearest.
 fn choose_info(
     scan: &Scan,
     input: &InputSettings,
@@ -229,7 +232,7 @@ fn choose_images(
     inputs: Inputs,
 ) -> Result<(Pick, Option<String>), LogError> {
     let is_disparity = input.disparity.is_some();
-    // Chosen first, because such images look like those of a grey camera.
+    // Chosen first, because disparity images look like those of a grey camera.
     let disparity = match (&input.depth_topic, is_disparity) {
         (None, true) => best_of(scan, &input.sources, scan.names(), disparity_rank),
         _ => None,
@@ -238,7 +241,7 @@ fn choose_images(
     let depth = named(scan, "depth_topic", input.depth_topic.as_deref(), |topic| {
         is_usable_depth(topic, input)
     });
-    // A mistake in a topic that is not used is none.
+    // An error in a topic that is not used does not matter.
     let depth = if inputs.uses(Input::Depth) { depth? } else { depth.unwrap_or(None) };
     let named = Pick {
         colour: named(scan, "colour_topic", colour_topic, is_usable_picture)?,
@@ -259,13 +262,13 @@ fn choose_images(
             continue;
         }
         let worth = rig.worth(scan, &pick, inputs);
-        // Of equal ones the first by name.
+        // Of equally good ones the first by name.
         if best.as_ref().is_none_or(|(.., most)| worth > *most) {
             best = Some((rig, pick, worth));
         }
     }
     let Some((rig, mut pick, _)) = best else { return Ok((named, None)) };
-    // Without colour, depth makes the frames whether or not it is used.
+    // Without colour, the frames are made from depth, whether or not depth is used.
     if !inputs.uses(Input::Depth) && pick.colour.is_some() {
         pick.depth = None;
         pick.depth_problem = None;
@@ -297,14 +300,14 @@ fn wanted_rigs<'a>(
             };
             return Err(missing(scan, format!("camera `{camera}`"), hint));
         }
-        // The name that the account gives a rig means that one alone.
+        // The label in the account means exactly that rig.
         let label = camera.trim_matches('/');
         let own = called.iter().copied().find(|rig| rig.label.trim_matches('/') == label);
         return Ok(own.map_or(called, |own| vec![own]));
     }
     for topic in [&named.colour, &named.right, &named.depth].into_iter().flatten() {
         let Some(own) = all.iter().find(|rig| rig.has(topic)) else { continue };
-        // Depth that the settings name may stand apart from the colour of its device.
+        // Depth that the settings name may be separate from the colour images of its device.
         let may_add = named.colour.is_none();
         let wanted =
             all.iter().filter(|rig| rig.has(topic) || may_add && may_be_one(scan, rig, own));
@@ -330,7 +333,8 @@ fn further_scans(
     further.map(|(name, _)| name.clone()).collect()
 }
 
-/// Returns the topic of a sensor: the one that the settings name, else that of the highest rank.
+/// Returns the topic of a sensor: the one that the settings name, or otherwise the one with the
+/// highest rank.
 fn choose_sensor(
     scan: &Scan,
     sensor: &SensorType,
@@ -342,7 +346,7 @@ fn choose_sensor(
     Ok(named.or_else(|| {
         best_of(scan, &input.sources, scan.names(), |name, topic| {
             let rank = sensor.rank.filter(|_| is_of(sensor, topic))?(&name.to_lowercase());
-            // Any scanner is better than one whose scans cannot be, or without a place or a time.
+            // Any scanner is better than one with impossible scans, or without a pose or a time.
             let frame = topic.frame_id.as_ref();
             let has_place = frame.is_none_or(|frame| scan.tf.connects(robot, frame));
             let is_possible = topic.impossible().is_none();
@@ -354,7 +358,7 @@ fn choose_sensor(
     }))
 }
 
-/// Requirement of a pipeline or of the frames, with the topics that could meet it.
+/// Requirement of a pipeline or of the frames, with the topics that could satisfy it.
 struct Requirement<'a> {
     lacks: bool,
     wanted: &'a str,
@@ -362,11 +366,11 @@ struct Requirement<'a> {
     /// Message types in words.
     types: String,
     fits: Box<dyn Fn(&Topic) -> bool + 'a>,
-    /// Topic that another input has, so that it cannot be meant.
+    /// Topic that is used for another input, so that it cannot be meant.
     taken: Option<&'a str>,
 }
 
-/// Checks that there is a topic for each required input, and one that makes the frames.
+/// Checks that there is a topic for each required input, and one from which the frames are made.
 fn check(
     scan: &Scan,
     chosen: &Chosen,
@@ -414,8 +418,8 @@ fn check(
 }
 
 impl Requirement<'_> {
-    /// Returns the error of a log that lacks the topic, with the reason of the topic that comes
-    /// nearest, and its remedy.
+    /// Returns the error for a log without the topic, with the reason and the remedy of the most
+    /// suitable other topic.
     fn error(&self, scan: &Scan, account: &InputAccount) -> LogError {
         let Self { wanted, key, types, fits, taken, .. } = self;
         let is_image = key.ends_with("_topic") && types.contains("Image");
@@ -520,8 +524,8 @@ fn named(
     })
 }
 
-/// Returns the topic with the highest rank of those in `names` that are no further sources of
-/// obstacles; of equal ones that with the most messages, then the first by name.
+/// Returns the topic with the highest rank among those in `names` that are not further obstacle
+/// sources; of equal ones the one with the most messages, then the first by name.
 pub(super) fn best_of<'a>(
     scan: &Scan,
     sources: &[ObstacleTopic],
@@ -535,7 +539,7 @@ pub(super) fn best_of<'a>(
         }
         let Some(topic) = scan.topics.get(name).filter(|topic| topic.count > 0) else { continue };
         let Some(rank) = rank(name, topic) else { continue };
-        // By powers of two: a lost message or two is no reason for another choice.
+        // Compared by powers of two, because one or two lost messages must not change the choice.
         let count = topic.count.ilog2();
         let is_better = best.is_none_or(|(most, of_best, first)| {
             (rank, count) > (most, of_best) || (rank, count) == (most, of_best) && name < first

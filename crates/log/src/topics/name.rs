@@ -1,11 +1,11 @@
-//! Topic names, taken apart: the device, its stream, and the side of a stereo pair.
+//! Analysis of topic names: the device, its stream, and the side of a stereo pair.
 
 use std::collections::BTreeSet;
 
-/// Stream of a device, as far as the name of a topic tells it.
+/// Stream of a device, as far as the topic name shows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Stream {
-    /// Nothing is said.
+    /// The name does not show it.
     Plain,
     /// Colour or grey images.
     Colour,
@@ -15,7 +15,7 @@ pub(crate) enum Stream {
     Other,
 }
 
-/// Side of a stereo pair that a name tells.
+/// Side of a stereo pair that a name shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Side {
     /// None.
@@ -29,13 +29,13 @@ pub(crate) enum Side {
 /// Parts of the name of a topic.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct TopicName {
-    /// Words that are left without those of streams, sides and codecs: the device.
+    /// Words for the device: those that are not for streams, sides or codecs.
     pub(crate) device: Vec<String>,
     pub(crate) stream: Stream,
     pub(crate) side: Side,
 }
 
-/// Words that say nothing about the device.
+/// Words that contain no information about the device.
 const GENERIC: &[&str] = &[
     "image",
     "images",
@@ -87,12 +87,12 @@ const OTHER: &[&str] = &[
     "points",
 ];
 
-/// Words for where a device sits; two of them that differ are two devices.
+/// Words for the position of a device; two different ones mean two devices.
 const PLACES: &[&str] =
     &["front", "rear", "back", "left", "right", "side", "top", "bottom", "up", "down", "head"];
 
 impl TopicName {
-    /// Takes a name apart.
+    /// Splits a topic name into its parts.
     pub(crate) fn of(topic: &str) -> Self {
         let mut parts = Self { device: Vec::new(), stream: Stream::Plain, side: Side::Neither };
         let mut follows_stream = false;
@@ -100,7 +100,7 @@ impl TopicName {
         let mut words =
             lower.split(['/', '_', '-', '.']).filter(|word| !word.is_empty()).peekable();
         while let Some(word) = words.next() {
-            // The stream behind "to" is that which depth is aligned to, not that of the images.
+            // The stream after "to" is the one to which depth is aligned, not that of the images.
             if word == "to" && words.peek().is_some_and(|next| stream_of(next).is_some()) {
                 words.next();
                 continue;
@@ -110,17 +110,18 @@ impl TopicName {
         parts
     }
 
-    /// Returns true for the points of a person that a run writes into its log of tracks for viewers.
+    /// Returns true for the points of a person that a run writes into its own track log for
+    /// viewers.
     pub(crate) fn is_own_output(topic: &str) -> bool {
         topic.strip_prefix("/people/person_").is_some_and(|rest| rest.ends_with("/body"))
     }
 
-    /// Takes in a word; returns true if a number behind it counts streams and not devices.
+    /// Adds a word; returns true if a number after it counts streams and not devices.
     fn take(&mut self, word: &str, follows_stream: bool) -> bool {
         let stem = word.trim_end_matches(|c: char| c.is_ascii_digit());
         let number = &word[stem.len()..];
         if stem.is_empty() {
-            // `Depth_0` and `sensor_1` of a recording, as opposed to `camera_1`.
+            // `Depth_0` and `sensor_1` in a recording, unlike `camera_1`.
             if !follows_stream {
                 self.push(number);
             }
@@ -159,7 +160,7 @@ impl TopicName {
         }
     }
 
-    /// Returns true if two names speak of devices at different places, or of different numbers.
+    /// Returns true if two names mean devices at different positions, or with different numbers.
     pub(crate) fn contradicts(&self, other: &Self) -> bool {
         let ours = self.places();
         let theirs = other.places();
@@ -176,7 +177,7 @@ impl TopicName {
     }
 }
 
-/// Returns a name in lower case, with `leftImage` as two words.
+/// Returns a name in lower case, with `leftImage` split into two words.
 fn parted(topic: &str) -> String {
     let mut out = String::with_capacity(topic.len() + 8);
     let mut was_lower = false;

@@ -1,5 +1,5 @@
-//! Choice of the odometry: of several topics the best one whose times are those of the frames, else
-//! transforms.
+//! Choice of the odometry: the best of several topics whose times agree with those of the frames,
+//! or otherwise transforms.
 
 use super::kinds::{is_odometry, odometry_rank};
 use super::problems::{Problem, RECORDING, WHOLE_SECONDS, clock_problem};
@@ -14,17 +14,17 @@ use crate::{InputSettings, LogError};
 #[derive(Clone, Debug, Default)]
 pub(super) struct FoundOdometry {
     pub(super) topic: Option<String>,
-    /// Frames of tf that give the poses where no topic does: odometry frame and robot frame.
+    /// Frames of tf that give the poses if no topic does: odometry frame and robot frame.
     pub(super) frames: Option<(String, String)>,
-    /// Odometry that would have come before and cannot be used, with the reasons.
+    /// Odometry that would have had priority but cannot be used, with the reasons.
     pub(super) unused: Vec<(String, Problem)>,
 }
 
-/// Chooses the odometry for frames that the topic `primary` makes: the topic that the settings name,
-/// else the best one that can be used, else transforms.
+/// Chooses the odometry for frames that are made from the topic `primary`: the topic that the
+/// settings name, otherwise the best one that can be used, otherwise transforms.
 ///
 /// # Errors
-/// A topic that the settings name and that is no odometry.
+/// A topic that the settings name but that is not odometry.
 pub(super) fn choose_odometry(
     scan: &Scan,
     input: &InputSettings,
@@ -62,10 +62,11 @@ pub(super) fn choose_odometry(
 
 /// Frame in which odometry moves, by convention (REP 105).
 const ODOMETRY_FRAME: &str = "odom";
-/// Lead of the stamps of odometry over those of the frames beyond which its clock is another one, s.
+/// Lead of the odometry stamps over those of the frames beyond which its clock must be a different
+/// one, s.
 const LEAD_S: f64 = 0.5;
 
-/// Returns the reason for which odometry cannot give the poses of the frames.
+/// Returns the reason why odometry cannot give the poses of the frames.
 pub(super) fn odometry_problem(scan: &Scan, primary: &str, odometry: &str) -> Option<Problem> {
     if scan.is_live() {
         return None;
@@ -92,8 +93,8 @@ pub(super) fn odometry_problem(scan: &Scan, primary: &str, odometry: &str) -> Op
     lag_problem(frames, poses)
 }
 
-/// Returns the words for odometry whose messages name the robot as the parent and the odometry frame as
-/// the child. Whether the poses are exchanged as well no message tells.
+/// Returns a message about odometry whose messages name the robot as the parent and the odometry
+/// frame as the child. No message shows whether the poses are exchanged as well.
 pub(crate) fn exchanged_frames(
     scan: &Scan,
     input: &InputSettings,
@@ -125,14 +126,14 @@ fn is_named(frame: &str, words: &[&str]) -> bool {
     words.iter().any(|word| name.starts_with(word))
 }
 
-/// Returns the problem of odometry whose stamps are all too early or too late by one time, which the
-/// times of recording tell.
+/// Returns the problem of odometry whose stamps are all too early or too late by the same time, as
+/// the recording times show.
 fn lag_problem(frames: &Topic, poses: &Topic) -> Option<Problem> {
     let of_frames_s = constant_lag_s(&frames.stamps, &frames.recorded)?;
     let of_poses_s = constant_lag_s(&poses.stamps, &poses.recorded)?;
     let off_s = of_poses_s - of_frames_s;
-    // Frames may come late by any time. Nothing has a stamp of the future, unless the clock of the
-    // recording is late itself.
+    // Frames may come late by any time. No stamp lies in the future, unless the clock of the
+    // recording itself is late.
     let is_ahead = off_s > LEAD_S && of_poses_s > FUTURE_S && of_frames_s < FUTURE_S;
     if !is_ahead && off_s > -DELAY_S {
         return None;
@@ -141,16 +142,17 @@ fn lag_problem(frames: &Topic, poses: &Topic) -> Option<Problem> {
     lag_of(format!("{:.2} s {side}", off_s.abs()))
 }
 
-/// Returns the problem of stamps that are another time than those of the frames, in words.
+/// Returns the problem of stamps that differ from those of the frames, in words.
 fn lag_of(off: String) -> Option<Problem> {
     let why = format!(
-        "its stamps are {off} than those of the frames, by the times of recording: another clock"
+        "compared by the times of recording, its stamps are {off} than those of the frames: \
+         another clock"
     );
     Problem::new(why, RECORDING)
 }
 
-/// Returns the problem of a transform whose stamps are all too early. Later ones tell nothing, because
-/// localisation gives its transforms later stamps on purpose.
+/// Returns the problem of a transform whose stamps are all too early. Late ones prove nothing,
+/// because localisation gives its transforms later stamps on purpose.
 fn late_transform_problem(frames: &Topic, link: &Times) -> Option<Problem> {
     let of_frames_s = constant_lag_s(&frames.stamps, &frames.recorded)?;
     let off_s = link.latest_lag_s()? - of_frames_s;
@@ -160,7 +162,7 @@ fn late_transform_problem(frames: &Topic, link: &Times) -> Option<Problem> {
     lag_of(format!("all {:.2} s or more earlier", -off_s))
 }
 
-/// Returns the reason for which transforms cannot be the odometry.
+/// Returns the reason why transforms cannot be the odometry.
 pub(crate) fn transform_odometry_problem(
     scan: &Scan,
     primary: &str,
@@ -179,7 +181,7 @@ pub(crate) fn transform_odometry_problem(
         if times.are_whole_seconds() {
             return Problem::new(WHOLE_SECONDS, RECORDING);
         }
-        // Above the odometry frame there is localisation, which corrects it now and then.
+        // Above the odometry frame there is localisation, which corrects it from time to time.
         let is_odometry_frame =
             frame.rsplit('/').next().is_some_and(|name| name.starts_with(ODOMETRY_FRAME));
         if !is_odometry_frame && let Some(problem) = late_transform_problem(frames, times) {
@@ -189,8 +191,8 @@ pub(crate) fn transform_odometry_problem(
     None
 }
 
-/// Returns the reason for which tf has no pose of frame `source` in frame `target` at the times of
-/// the frames that the topic `primary` makes: a moving transform of another clock.
+/// Returns the reason why tf has no pose of frame `source` in frame `target` at the times of the
+/// frames made from the topic `primary`: a moving transform with another clock.
 pub(crate) fn transform_problem(
     scan: &Scan,
     primary: &str,

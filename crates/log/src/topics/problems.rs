@@ -1,4 +1,4 @@
-//! Reasons for which a topic that is there cannot be used.
+//! Reasons why an existing topic cannot be used.
 
 use super::calibration::{calibration_of, calibrations, intrinsics_of, misfit};
 use crate::InputSettings;
@@ -9,7 +9,7 @@ use crate::sensors::recent::NEAR_S as NEAR_SCAN_S;
 use crate::source::robot_frame;
 use crate::timing::{Skew, Timing, clock_words};
 
-/// Reason, with the setting or the action that cures it.
+/// Reason, with the setting or the action that solves the problem.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Problem {
     pub(crate) why: String,
@@ -22,9 +22,9 @@ impl Problem {
     }
 }
 
-/// Share of the messages that a remedy has to bring together with frames.
+/// Fraction of the messages that a remedy must match with frames.
 const MOST_PAIRED: f64 = 0.5;
-/// Offset beyond which two topics have different clocks, s.
+/// Offset beyond which two topics must have different clocks, s.
 const OTHER_CLOCK_S: f64 = 5.0;
 
 /// Remedy for clocks that differ.
@@ -37,7 +37,7 @@ pub(super) const TOGETHER: &str = "record it together with the sensor that makes
 /// Reason for stamps that are rounded to seconds.
 pub(super) const WHOLE_SECONDS: &str = "its stamps are rounded to whole seconds";
 
-/// Returns the reason for which depth cannot be brought together with the colour images.
+/// Returns the reason why depth cannot be matched with the colour images.
 pub(crate) fn depth_problem(
     scan: &Scan,
     input: &InputSettings,
@@ -46,7 +46,7 @@ pub(crate) fn depth_problem(
 ) -> Option<Problem> {
     let of_colour = scan.topics.get(colour)?;
     let of_depth = scan.topics.get(depth)?;
-    // On a robot, the first messages tell nothing about those to come.
+    // On a robot, the first messages prove nothing about those to come.
     if !scan.is_live()
         && let Some(problem) = pairing_problem(scan, of_colour, of_depth, input.pair_tolerance_s)
     {
@@ -55,7 +55,7 @@ pub(crate) fn depth_problem(
     registration_problem(scan, input, colour, depth)
 }
 
-/// Returns the reason for which no image of a second topic is near one of the first in time.
+/// Returns the reason why no image of a second topic is close in time to one of the first.
 pub(super) fn pairing_problem(
     scan: &Scan,
     first: &Topic,
@@ -93,7 +93,7 @@ pub(super) fn pairing_problem(
 }
 
 /// Share of the period of images within which a neighbour in time is that image and not the next one.
-const NEAR_PERIODS: f64 = 0.45;
+const NEAR_PERIODS: f64 = 0.48;
 
 /// Returns the offset up to which images of two topics are neighbours without doubt, s: nearly half the
 /// period of the faster one.
@@ -132,14 +132,14 @@ pub(super) fn wider_tolerance(size_s: f64) -> String {
     format!("set `pair_tolerance_s = {:.2}` under [input]", 1.2 * size_s + 0.01)
 }
 
-/// Returns the reason for which no recorded detections belong to a frame.
+/// Returns the reason why no recorded detections belong to a frame.
 pub(super) fn detections_problem(
     scan: &Scan,
     input: &InputSettings,
     primary: &str,
     detections: &str,
 ) -> Option<Problem> {
-    // On a robot, the first messages tell nothing about those to come.
+    // On a robot, the first messages prove nothing about those to come.
     if scan.is_live() {
         return None;
     }
@@ -151,7 +151,7 @@ pub(super) fn detections_problem(
         let why = format!("its stamps are not set: all are {stamp}");
         return Problem::new(why, recording_of(frames, messages, tolerance_s));
     }
-    // Detections may be slower than images, so that each of them counts and not each image.
+    // Detections may be slower than images, so each of them counts rather than each image.
     let skew = Skew::between(&messages.stamps, &frames.stamps, tolerance_s)?;
     if let Some(off_s) = messages.clock_from(frames, skew.paired == 0.0) {
         let why = clock_words(off_s, "frames");
@@ -182,8 +182,8 @@ pub(super) fn detections_problem(
     }
 }
 
-/// Returns the time from the first frame to the first of other messages, s, if all of them lie apart
-/// from all frames in time.
+/// Returns the time from the first frame to the first of other messages, s, if all of these are
+/// outside of the time span of the frames.
 fn other_clock(frames: &Topic, messages: &Topic) -> Option<f64> {
     let frames = frames.times()?;
     let messages = messages.times()?;
@@ -197,7 +197,7 @@ fn is_recorded_apart(first: &Topic, second: &Topic) -> bool {
     second.first_log_time > first.last_log_time || second.last_log_time < first.first_log_time
 }
 
-/// Returns the reason for which no scan of a scanner is near a frame in time.
+/// Returns the reason why no scan of a scanner is close in time to a frame.
 pub(super) fn scan_times_problem(scan: &Scan, primary: &str, scanner: &str) -> Option<Problem> {
     if scan.is_live() || primary == scanner {
         return None;
@@ -226,7 +226,7 @@ pub(super) fn scan_times_problem(scan: &Scan, primary: &str, scanner: &str) -> O
     Problem::new(format!("{why}, by another clock"), RECORDING)
 }
 
-/// Returns the remedy by the times of recording, with a tolerance for a detector that takes its time.
+/// Returns the remedy of using recording times, with a tolerance for a slow detector.
 fn recording_of(frames: &Topic, messages: &Topic, tolerance_s: f64) -> String {
     let skew = Skew::between(&messages.recorded, &frames.recorded, tolerance_s);
     match skew.filter(|skew| skew.paired < MOST_PAIRED) {
@@ -235,7 +235,7 @@ fn recording_of(frames: &Topic, messages: &Topic, tolerance_s: f64) -> String {
     }
 }
 
-/// Returns the reason for which depth cannot be moved into the view of the colour camera.
+/// Returns the reason why depth cannot be transformed to the view of the colour camera.
 fn registration_problem(
     scan: &Scan,
     input: &InputSettings,
@@ -244,7 +244,7 @@ fn registration_problem(
 ) -> Option<Problem> {
     let of_colour = scan.topics.get(colour)?.size?;
     let of_depth = scan.topics.get(depth)?.size?;
-    // Images of the same size are taken to be registered where nothing says how to do it.
+    // Images of the same size are assumed to be registered if nothing tells how to register them.
     if of_colour == of_depth {
         return None;
     }
@@ -257,8 +257,8 @@ fn registration_problem(
     Problem::new(format!("{sizes}, and {why}"), remedy)
 }
 
-/// Returns the missing part of the geometry by which depth is moved into the view of the colour camera;
-/// `None` if it is whole.
+/// Returns the missing part of the geometry for transforming depth to the view of the colour
+/// camera; `None` if it is complete.
 pub(crate) fn geometry_problem(
     scan: &Scan,
     input: &InputSettings,
@@ -321,10 +321,10 @@ fn depth_lens(
     lens.map(|lens| (topic.clone(), lens)).map_err(|why| format!("its calibration {topic}: {why}"))
 }
 
-/// Remedy for scans with a header that cannot be.
+/// Remedy for scans with an impossible header.
 pub(super) const SCANNER_REMEDY: &str = "correct the driver's settings of the scanner";
 
-/// Returns the reason for which the scans of a topic cannot be used beside those of the first one.
+/// Returns the reason why the scans of a topic cannot be used together with those of the first one.
 pub(super) fn scanner_problem(
     scan: &Scan,
     input: &InputSettings,
@@ -352,7 +352,7 @@ pub(super) fn scanner_problem(
     scan_times_problem(scan, primary, topic)
 }
 
-/// Returns the problem of poses of which none is near a frame in time. `subject` names them.
+/// Returns the problem of poses that are all far from the frames in time. `subject` names them.
 pub(super) fn clock_problem(frames: &Times, poses: &Times, subject: &str) -> Option<Problem> {
     let behind_s = poses.first.seconds_since(frames.last);
     let ahead_s = frames.first.seconds_since(poses.last);
@@ -377,5 +377,5 @@ pub(super) fn clock_problem(frames: &Times, poses: &Times, subject: &str) -> Opt
     }
 }
 
-/// Time between a frame and a pose beyond which the two have nothing to do with each other, s.
+/// Time between a frame and a pose beyond which the two are unrelated, s.
 const NEAR_S: f64 = 1.0;

@@ -14,12 +14,12 @@ use crate::{Input, InputSettings, Inputs};
 /// Images of one device.
 #[derive(Clone, Debug)]
 pub(super) struct Rig {
-    /// Name for the user: the folder that the topics share.
+    /// Name for the user: the namespace that the topics share.
     pub(super) label: String,
     pub(super) topics: Vec<String>,
 }
 
-/// Images that are chosen of a rig.
+/// Images that are chosen from a rig.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Pick {
     pub(super) colour: Option<String>,
@@ -28,12 +28,12 @@ pub(super) struct Pick {
     pub(super) depth_problem: Option<Problem>,
 }
 
-/// Largest distance of two cameras of one device, m.
+/// Maximum distance between two cameras of one device, m.
 const ONE_MOUNT_M: f64 = 0.5;
-/// Largest angle between the views of two cameras of one device, rad.
+/// Maximum angle between the viewing directions of two cameras of one device, rad.
 const ONE_MOUNT_RAD: f64 = std::f64::consts::FRAC_PI_4;
 
-/// Groups the images of a log by their devices.
+/// Groups the images of a log by device.
 pub(super) fn rigs(scan: &Scan) -> Vec<Rig> {
     let images: Vec<&String> =
         scan.topics.iter().filter(|(_, topic)| is_image(topic)).map(|(name, _)| name).collect();
@@ -57,14 +57,14 @@ pub(super) fn rigs(scan: &Scan) -> Vec<Rig> {
     found
 }
 
-/// Returns the words of the device of a topic, as one; `None` without any.
+/// Returns the device words of a topic, joined; `None` without any.
 fn words_of(topic: &str) -> Option<String> {
     let words = TopicName::of(topic).device;
     (!words.is_empty()).then(|| words.join("_"))
 }
 
-/// Splits a group at left and right if each side has depth of its own, which are two devices and no
-/// stereo pair.
+/// Splits a group into left and right if each side has its own depth, because those are two devices
+/// and not a stereo pair.
 fn by_side(scan: &Scan, group: Vec<String>) -> Vec<Rig> {
     let with_depth: Vec<Side> = group
         .iter()
@@ -82,8 +82,8 @@ fn by_side(scan: &Scan, group: Vec<String>) -> Vec<Rig> {
     sides.into_values().map(|topics| Rig { label: String::new(), topics }).collect()
 }
 
-/// Joins a rig that has depth alone with the only one that has colour alone and may be of the same
-/// device: names of drivers do not always have a word in common.
+/// Joins a rig that has only depth with the only one that has only colour and may belong to the
+/// same device, because drivers do not always use a common word in the names.
 fn join_streams(scan: &Scan, rigs: &mut Vec<Rig>) {
     loop {
         let mut pairs = Vec::new();
@@ -105,8 +105,8 @@ fn join_streams(scan: &Scan, rigs: &mut Vec<Rig>) {
     }
 }
 
-/// Joins pictures that other programs made of a camera's images, as with boxes drawn into them, with that
-/// camera: they stand in its folder and have its frame.
+/// Joins pictures that other programs made from the images of a camera, for example with boxes
+/// drawn into them, with that camera: they have the same namespace and frame id.
 fn join_copies(scan: &Scan, rigs: &mut Vec<Rig>) {
     let mut at = 0;
     while at < rigs.len() {
@@ -138,8 +138,8 @@ fn has_content(scan: &Scan, rig: &Rig, content: Content) -> bool {
     rig.topics.iter().any(|name| scan.topics[name].content == content)
 }
 
-/// Returns true if two groups may be streams of one device: by frame, by the mounts in tf, and
-/// without both if their names do not speak of different places.
+/// Returns true if two groups may be streams of one device: by frame id, by the mounts in tf, and
+/// without both if their names do not mean different positions.
 pub(super) fn may_be_one(scan: &Scan, colour: &Rig, depth: &Rig) -> bool {
     let mut may_be = false;
     for (a, b) in colour.topics.iter().flat_map(|a| depth.topics.iter().map(move |b| (a, b))) {
@@ -152,14 +152,14 @@ pub(super) fn may_be_one(scan: &Scan, colour: &Rig, depth: &Rig) -> bool {
     may_be
 }
 
-/// Returns true if two cameras sit together and look the same way, by their frames and tf; `None` if
-/// these do not tell.
+/// Returns true if two cameras are close together and look in the same direction, by their frames
+/// and tf; `None` if these do not show it.
 fn is_one_mount(scan: &Scan, a: &str, b: &str) -> Option<bool> {
     are_one_mount(scan, scan.frame_of(a)?, scan.frame_of(b)?)
 }
 
-/// Returns true if two frames of cameras sit together and look the same way; `None` if tf does not
-/// tell.
+/// Returns true if two camera frames are close together and have the same viewing direction; `None`
+/// if tf does not show it.
 fn are_one_mount(scan: &Scan, a: &str, b: &str) -> Option<bool> {
     if a == b {
         return (!a.is_empty()).then_some(true);
@@ -172,13 +172,13 @@ fn are_one_mount(scan: &Scan, a: &str, b: &str) -> Option<bool> {
     Some(is_near && pose.rotation.angle() <= ONE_MOUNT_RAD)
 }
 
-/// Returns the folder of a topic; empty at the root.
+/// Returns the namespace of a topic; empty at the root.
 fn parent(topic: &str) -> &str {
     topic.rsplit_once('/').map_or("", |(folder, _)| folder)
 }
 
 /// Finds the frames of other cameras: those of images of other devices, and optical ones in tf,
-/// unless tf puts them beside the own camera.
+/// unless tf places them beside the own camera.
 pub(crate) fn camera_frames(scan: &Scan, primary: &str) -> CameraFrames {
     let Some(own) = scan.frame_of(primary).filter(|own| !own.is_empty()) else {
         return CameraFrames::default();
@@ -196,7 +196,8 @@ pub(crate) fn camera_frames(scan: &Scan, primary: &str) -> CameraFrames {
         }
     }
     for frame in scan.tf.parents().into_keys() {
-        // Other frames are of no camera, as that of a robot whose detector names it.
+        // Other frames do not belong to a camera, for example that of a robot whose detector uses
+        // it.
         if !frame.contains("optical") {
             continue;
         }
@@ -208,11 +209,11 @@ pub(crate) fn camera_frames(scan: &Scan, primary: &str) -> CameraFrames {
     CameraFrames::new(own, beside, others)
 }
 
-/// Rank of depth that is registered to colour: more than any name gives.
+/// Rank of depth that is registered to colour: higher than any rank by name.
 const REGISTERED_RANK: i32 = 16;
 
-/// Returns the rank of depth images by their frame: those in the frame of the colour images are
-/// registered to them. Points are in that frame, too, where the images that they come from are not.
+/// Returns the rank of depth images by their frame id: those in the frame of the colour images are
+/// registered to them. Points may also be in that frame if the images from which they come are not.
 fn registered_rank(scan: &Scan, colour: Option<&str>, depth: &str) -> i32 {
     let of_colour = colour.and_then(|colour| scan.frame_of(colour));
     let is_cloud = scan.topics.get(depth).is_some_and(|topic| topic.kind == Type::PointCloud);
@@ -220,7 +221,7 @@ fn registered_rank(scan: &Scan, colour: Option<&str>, depth: &str) -> i32 {
     if is_known && !is_cloud && scan.frame_of(depth) == of_colour { REGISTERED_RANK } else { 0 }
 }
 
-/// Returns the folder that the topics of a rig share, else the folder of the first one.
+/// Returns the namespace that the topics of a rig share, or otherwise that of the first one.
 fn label_of(topics: &[String]) -> String {
     let mut shared: Option<Vec<&str>> = None;
     for topic in topics {
@@ -245,8 +246,8 @@ impl Rig {
         self.topics.iter().any(|own| own == topic)
     }
 
-    /// Returns true if a picture may be made of one of this rig: by its folder, its frame, and a name with
-    /// more words.
+    /// Returns true if a picture may be made from one of this rig: by its namespace, its frame id,
+    /// and a name with additional words.
     fn holds_original(&self, scan: &Scan, copy: &str) -> bool {
         let name = TopicName::of(copy);
         let frame = scan.frame_of(copy).filter(|frame| !frame.is_empty());
@@ -264,8 +265,8 @@ impl Rig {
         })
     }
 
-    /// Returns true if the user may mean this rig by a name: its folder, a part of it, or the words
-    /// of the device.
+    /// Returns true if the user may mean this rig by a name: its namespace, a part of it, or the
+    /// words for the device.
     pub(super) fn is_called(&self, name: &str) -> bool {
         let wanted = name.trim_matches('/');
         let words = TopicName::of(name).device;
@@ -278,7 +279,7 @@ impl Rig {
             })
     }
 
-    /// Chooses the images of the rig. Those that are `taken` already have another use.
+    /// Chooses the images of the rig. Those that are `taken` are already used for another input.
     pub(super) fn pick(&self, scan: &Scan, input: &InputSettings, named: &Pick) -> Pick {
         let is_pair = self.is_pair(scan);
         let colour = named.colour.clone().or_else(|| {
@@ -311,8 +312,8 @@ impl Rig {
         Pick { colour, depth, right, depth_problem }
     }
 
-    /// Returns true if the rig has pictures of both sides, so that those of the right are not the
-    /// images of the frames.
+    /// Returns true if the rig has pictures of both sides, so that the frames are not made from
+    /// those of the right side.
     fn is_pair(&self, scan: &Scan) -> bool {
         let mut pictures = self.topics.iter().filter(|name| is_usable_picture(&scan.topics[*name]));
         pictures.any(|name| {
@@ -321,8 +322,8 @@ impl Rig {
         })
     }
 
-    /// Returns the topic with the highest rank that is no further source of obstacles; of equal ones
-    /// that with the most messages, then the first by name.
+    /// Returns the topic with the highest rank that is not a further obstacle source; of equal ones
+    /// the one with the most messages, then the first by name.
     fn best(
         &self,
         scan: &Scan,
@@ -333,8 +334,8 @@ impl Rig {
         super::best_of(scan, &input.sources, names, rank)
     }
 
-    /// Returns the worth of the rig for a pipeline: first that nothing which is required is missing,
-    /// then what it has beyond that, then names and rates.
+    /// Returns the value of the rig for a pipeline: first that nothing required is missing, then
+    /// what it has beyond that, then names and rates.
     pub(super) fn worth(&self, scan: &Scan, pick: &Pick, inputs: Inputs) -> [i64; 4] {
         let has_depth = pick.depth.is_some() && pick.depth_problem.is_none();
         let has = [
@@ -354,7 +355,7 @@ impl Rig {
             let lower = name.to_lowercase();
             colour_rank(&lower, topic).or(depth_rank(&lower, topic)).unwrap_or(0)
         });
-        // A lost message or two is no reason to prefer another camera.
+        // One or two lost messages are no reason to prefer another camera.
         let count = topic.map_or(0, |(_, topic)| topic.count.max(1).ilog2());
         [-(lacking as i64), extra, i64::from(rank), i64::from(count)]
     }

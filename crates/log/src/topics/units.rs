@@ -1,13 +1,13 @@
-//! Units of depth that cameras tell, and the depth images that they are for.
+//! Depth units that cameras publish, and the depth images to which they apply.
 
 use super::calibration::{common_folders, folders};
 use super::name::TopicName;
 use crate::images::Content;
 use crate::scan::Scan;
 
-/// Returns the unit of depth that the camera of a depth topic tells, m, with the topic that says so:
-/// that which shares most folders with it. `None` if only other cameras tell theirs, or several could
-/// be meant that differ.
+/// Returns the unit that the camera of a depth topic publishes, m, with the topic of the unit: the
+/// one that shares the most namespaces with it. `None` if only other cameras publish their unit, or
+/// if several that differ could be meant.
 pub(crate) fn told_unit<'a>(scan: &'a Scan, depth: &str) -> Option<(&'a str, f64)> {
     let mut best: Option<(usize, &str, f64)> = None;
     let mut is_open = false;
@@ -28,8 +28,8 @@ pub(crate) fn told_unit<'a>(scan: &'a Scan, depth: &str) -> Option<(&'a str, f64
     best.filter(|_| !is_open).map(|(_, topic, unit_m)| (topic, unit_m))
 }
 
-/// Returns true if the topic of a unit may be of the device of a depth topic: it stands in the root or
-/// shares a folder, and no other device with depth is nearer to it.
+/// Returns true if the topic of a unit may belong to the device of a depth topic: it is in the root
+/// or shares a namespace, and no other device with depth is nearer to it.
 fn is_unit_of(scan: &Scan, unit: &str, depth: &str) -> bool {
     let common = common_folders(unit, depth);
     let has_folder = folders(unit).next().is_some();

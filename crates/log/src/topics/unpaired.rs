@@ -1,4 +1,4 @@
-//! Frames that are lost because no image of another topic belongs to them.
+//! Frames that are lost because they have no image of another topic.
 
 use tagalong_core::Stamp;
 use tagalong_math::median;
@@ -9,30 +9,30 @@ use super::problems::{
 use crate::scan::{Scan, Topic};
 use crate::timing::{Skew, Timing, nearest};
 
-/// Number and share of the frames without a partner that are usual: cameras leave out an image now and
-/// then.
+/// Number and fraction of the frames without a partner that are normal: cameras skip an image from
+/// time to time.
 const USUAL_COUNT: u64 = 3;
 const USUAL_SHARE: f64 = 0.1;
-/// Ratio of the periods of two topics from which on one is slower.
+/// Ratio of the periods of two topics from which on one counts as slower.
 const SLOWER: f64 = 1.5;
-/// Shortest step of a topic that is slower by itself, in periods.
+/// Minimum step of a topic that is slower by itself, in periods.
 const EVEN: f64 = 0.75;
-/// Longest gap of a topic that is slower and whole, in periods.
+/// Maximum gap of a topic that is slower but complete, in periods.
 const LONGEST_GAP: f64 = 3.0;
-/// Share of the images of a slower topic that belong to a frame.
+/// Fraction of the images of a slower topic that must belong to a frame.
 const MOST_PAIRED: f64 = 0.9;
 /// Part of the time that a topic lacks by its stamps which it has to lack by the recording times, too.
 const RECORDED_PART: f64 = 0.5;
-/// Time in the log between a frame and its partner from which on it is too long to wait for, s.
+/// Time between a frame and its partner in the log from which on it is too long to wait, s.
 const LONG_S: f64 = 1.0;
 
-/// Returns true for more frames without a partner than cameras leave out.
+/// Returns true if more frames have no partner than cameras normally skip.
 pub(crate) fn is_unusual(without: u64, frames: u64) -> bool {
     without > USUAL_COUNT && without as f64 > USUAL_SHARE * frames as f64
 }
 
-/// Returns the reason for which many frames of a topic have no image of a second one; `None` if that is
-/// slower by itself, so that nothing is lost.
+/// Returns the reason why many frames of a topic have no image of a second one; `None` if that one
+/// is slower by itself, so that nothing is lost.
 pub(crate) fn unpaired(
     scan: &Scan,
     first: &str,
@@ -69,8 +69,8 @@ fn has_whole_seconds(topic: &Topic) -> bool {
     topic.times().is_some_and(|times| times.are_whole_seconds())
 }
 
-/// Returns the problem of partners with the stamps of most frames that stand elsewhere in the log, too
-/// far for the frames to wait.
+/// Returns the problem of partners that have the stamps of most frames but were recorded at other
+/// positions in the log, too far away for the frames to wait.
 fn recorded_apart(frames: &Topic, partners: &Topic, tolerance_s: f64) -> Option<Problem> {
     let mut known: Vec<(Stamp, Stamp)> =
         partners.stamps.iter().copied().zip(partners.recorded.iter().copied()).collect();
@@ -96,7 +96,8 @@ fn recorded_apart(frames: &Topic, partners: &Topic, tolerance_s: f64) -> Option<
     Problem::new(why, TOGETHER)
 }
 
-/// Returns the words for partners that begin late or end early, if most frames without one lie there.
+/// Returns a message about partners that begin late or end early, if most frames without a partner
+/// are there.
 fn is_short(frames: &Topic, partners: &Topic, tolerance_s: f64) -> Option<String> {
     let times = partners.times()?;
     let of_frames = frames.times()?;
@@ -137,7 +138,7 @@ fn is_short(frames: &Topic, partners: &Topic, tolerance_s: f64) -> Option<String
     })
 }
 
-/// Returns the words for partners that are slower than the frames by themselves, with both rates.
+/// Returns a message about partners that are slower than the frames by themselves, with both rates.
 pub(crate) fn slower_words(scan: &Scan, first: &str, second: &str) -> Option<String> {
     let fast = Timing::of(&scan.topics.get(first)?.stamps)?;
     let slow = Timing::of(&scan.topics.get(second)?.stamps)?;
@@ -148,14 +149,14 @@ pub(crate) fn slower_words(scan: &Scan, first: &str, second: &str) -> Option<Str
     ))
 }
 
-/// Returns true if the partners come at a lower rate, evenly, and each of them belongs to a frame.
+/// Returns true if the partners have a lower but regular rate, and each of them belongs to a frame.
 fn is_slower(frames: &Topic, partners: &Topic, tolerance_s: f64) -> bool {
     let (Some(fast), Some(slow)) = (Timing::of(&frames.stamps), Timing::of(&partners.stamps))
     else {
         return false;
     };
     let paired = Skew::between(&partners.stamps, &frames.stamps, tolerance_s);
-    // Where images were dropped, the others come at the rate of the frames.
+    // If images were dropped, the remaining ones have the rate of the frames.
     let steps = partners.stamps.windows(2).map(|pair| pair[1].seconds_since(pair[0]));
     let short = steps.filter(|step_s| *step_s < EVEN * slow.median_period_s).count();
     !is_unusual(short as u64, partners.stamps.len() as u64)

@@ -1,4 +1,4 @@
-//! State of a walk through a log file, shared by the readers of all containers.
+//! State while reading a log file, shared by the readers of all containers.
 
 mod source;
 
@@ -15,7 +15,7 @@ use crate::packed::{is_packed, unpack_message};
 /// Stream of messages of one type.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Channel {
-    /// Id within the file.
+    /// ID within the file.
     pub id: u16,
     /// Name of the topic.
     pub topic: String,
@@ -26,7 +26,8 @@ pub struct Channel {
     pub schema_encoding: String,
     /// Encoding of the messages, for example `cdr`.
     pub encoding: String,
-    /// Definition of the message type, with those that it contains; empty if the file has none.
+    /// Definition of the message type, including those that it contains; empty if the file has
+    /// none.
     pub definition: Arc<str>,
 }
 
@@ -35,7 +36,7 @@ pub struct Channel {
 pub struct Message<'a> {
     /// Channel on which it was published.
     pub channel: &'a Arc<Channel>,
-    /// Time of recording, ns.
+    /// Recording time, ns.
     pub log_time: u64,
     /// Time of publication, ns.
     pub publish_time: u64,
@@ -67,7 +68,7 @@ pub const LOSSES: &[&str] = &[
     "unknown_compression_chunks",
 ];
 
-/// Maximum number of sentences kept about one file.
+/// Maximum number of stored sentences about one file.
 const MAX_NOTES: usize = 12;
 
 /// Position of a message in the buffer.
@@ -79,19 +80,19 @@ pub(crate) struct Located {
     pub(crate) data: Range<usize>,
 }
 
-/// Position in a log file, and the findings so far.
+/// Position in a log file, and the results so far.
 pub(crate) struct Walk<R> {
     pub(crate) source: Source<R>,
     pub(crate) limits: Limits,
     pub(crate) channels: BTreeMap<u16, Arc<Channel>>,
     /// Records of the current chunk, or one top-level record.
     pub(crate) buffer: Vec<u8>,
-    /// Part of the buffer that is still to be read.
+    /// Part of the buffer that has not been read yet.
     pub(crate) rest: Range<usize>,
     /// Offset of the current top-level record in the file.
     pub(crate) offset: u64,
     pub(crate) located: Option<Located>,
-    /// The message itself, if it is compressed in the buffer.
+    /// The decompressed message, if it is compressed in the buffer.
     unpacked: Vec<u8>,
     is_unpacked: bool,
     pub(crate) counters: Counters,
@@ -100,7 +101,7 @@ pub(crate) struct Walk<R> {
 }
 
 impl<R: Read> Walk<R> {
-    /// Starts behind the part of the file that was read from `source`.
+    /// Starts after the part of the file that was already read from `source`.
     pub(crate) fn new(source: Source<R>, limits: &Limits) -> Self {
         Self {
             offset: source.position(),
@@ -134,7 +135,7 @@ impl<R: Read> Walk<R> {
         *self.counters.entry(name).or_default() += 1;
     }
 
-    /// Counts a fault, and keeps a sentence about the first few.
+    /// Counts a fault, and stores a sentence about the first few.
     pub(crate) fn fault(&mut self, name: &'static str, what: impl FnOnce() -> String) {
         self.count(name);
         if self.notes.len() < MAX_NOTES {
@@ -158,7 +159,7 @@ impl<R: Read> Walk<R> {
     /// Adds a channel that a record defines.
     pub(crate) fn learn(&mut self, channel: Channel) {
         let known = self.channels.entry(channel.id).or_insert_with(|| Arc::new(channel.clone()));
-        // The first one is kept; messages of the other cannot be told apart from its own.
+        // The first one is kept; messages of the other cannot be distinguished from its own.
         if known.topic != channel.topic || known.encoding != channel.encoding {
             let topic = known.topic.clone();
             self.fault("conflicting_channels", || {

@@ -1,9 +1,9 @@
-//! File, read front to back, with its position and running checksum.
+//! File that is read from front to back, with its position and running checksum.
 
 use std::io::{BufReader, Read};
 
-/// Step in which memory is taken, so that a wrong length costs no more than the bytes that are
-/// really there.
+/// Step in which memory is allocated, so that a wrong length costs no more than the bytes that
+/// exist.
 const STEP: usize = 1 << 20;
 
 pub(crate) struct Source<R> {
@@ -35,7 +35,7 @@ impl<R: Read> Source<R> {
         self.reader.into_inner()
     }
 
-    /// Fills `out` as far as the file goes; returns the number of bytes.
+    /// Fills `out` up to the end of the file; returns the number of bytes.
     pub(crate) fn fill(&mut self, out: &mut [u8]) -> usize {
         let mut got = 0;
         while got < out.len() {
@@ -47,7 +47,8 @@ impl<R: Read> Source<R> {
         got
     }
 
-    /// Replaces the contents of `out` by the next `length` bytes, or as many as there are.
+    /// Replaces the contents of `out` with the next `length` bytes, or with fewer at the end of the
+    /// file.
     pub(crate) fn read_into(&mut self, out: &mut Vec<u8>, length: u64) -> u64 {
         out.clear();
         while (out.len() as u64) < length {
@@ -64,9 +65,9 @@ impl<R: Read> Source<R> {
         out.len() as u64
     }
 
-    /// Skips `length` bytes; returns the number of bytes that there were.
+    /// Skips `length` bytes; returns the number of bytes that existed.
     pub(crate) fn skip(&mut self, length: u64) -> u64 {
-        // Read and not sought, because the checksum covers skipped records, too.
+        // Read instead of seeking, because the checksum covers skipped records as well.
         let mut scratch = std::mem::take(&mut self.scratch);
         scratch.resize(1 << 16, 0);
         let mut done = 0;

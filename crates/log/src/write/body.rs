@@ -1,5 +1,5 @@
-//! Bodies of people as points, for viewers that draw no cylinders (Rerun): one cloud per person in
-//! the frame of that person, which the transforms move.
+//! Bodies of people as points, for viewers that cannot draw cylinders (Rerun): one cloud per person
+//! in the frame of that person, which moves with the transforms.
 
 use std::f64::consts::TAU;
 
@@ -16,23 +16,23 @@ const HEAD_M: f64 = 0.1;
 /// Height of the shoulders below the centre of the head, m.
 const SHOULDERS_BELOW_M: f64 = 0.2;
 
-/// Points of a ring, and distance of two rings, m.
+/// Number of points of a ring, and distance between two rings, m.
 const RING_POINTS: u32 = 16;
 const RING_APART_M: f64 = 0.08;
 
-/// Change of the head's height from which on the body is written again, m.
+/// Change of the head height from which on the body is written again, m.
 const RESIZED_M: f64 = 0.1;
 
-/// Body that is shown of one person.
+/// Body of one person as it is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Body {
-    /// Height of the head over the floor, m; none while nothing is shown.
+    /// Height of the head above the floor, m; `None` while nothing is shown.
     head_m: Option<f64>,
 }
 
 impl Body {
-    /// Takes the height of the head over the floor, m, or none for a track that has ended. Returns
-    /// false if the cloud that was written last still holds.
+    /// Sets the height of the head above the floor, m, or `None` for a track that has ended.
+    /// Returns false if the last cloud that was written is still valid.
     pub(super) fn update(&mut self, head_m: Option<f64>) -> bool {
         let holds = match (self.head_m, head_m) {
             (Some(shown), Some(now)) => (shown - now).abs() < RESIZED_M,
@@ -64,7 +64,7 @@ fn points(head_m: f64) -> Vec<Vector3<f64>> {
     out
 }
 
-/// The points of a level circle at this height.
+/// Returns the points of a horizontal circle at this height.
 fn ring_points(radius: f64, z: f64) -> impl Iterator<Item = Vector3<f64>> {
     (0..RING_POINTS).map(move |i| {
         let (sin, cos) = (TAU * f64::from(i) / f64::from(RING_POINTS)).sin_cos();

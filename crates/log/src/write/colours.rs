@@ -1,7 +1,7 @@
 use tagalong_core::TrackId;
 
-/// Colours of tracks: neighbours in number are far apart in hue. All are of medium lightness, so
-/// that each stands out from white and from dark paper.
+/// Colours of tracks: consecutive IDs are far apart in hue. All are of medium lightness, so that
+/// each stands out from white and from dark backgrounds.
 const COLOURS: [[u8; 3]; 20] = [
     [61, 139, 253],
     [232, 113, 10],

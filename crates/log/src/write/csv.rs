@@ -12,9 +12,10 @@ var_zz_m2,seen";
 /// Writes the lines of `tracks.csv` for one frame: the ten columns of the MOTChallenge,
 /// `frame,id,x,y,w,h,score,-1,-1,-1`.
 ///
-/// `frame` is the 1-based index of the frame; the box is the upper-body square, or that of the whole
-/// person where the settings say so, clipped to the image, in pixels with (0, 0) at the upper left corner; `score` is a probability. Only confirmed
-/// tracks are written, unless unseen for longer than `report_unseen_s`.
+/// `frame` is the 1-based index of the frame; the box is the upper-body square, or that of the
+/// whole person if the settings say so, clipped to the image, in pixels with (0, 0) at the upper
+/// left corner; `score` is a probability. Only confirmed tracks are written, unless they have not
+/// been seen for longer than `report_unseen_s`.
 pub(super) fn boxes(
     out: &mut impl Write,
     record: &FrameRecord<'_>,
@@ -41,7 +42,7 @@ pub(super) fn boxes(
     Ok(())
 }
 
-/// Writes the lines of `tracks-metres.csv` for one frame, all confirmed tracks.
+/// Writes the lines of `tracks-metres.csv` for one frame, with all confirmed tracks.
 pub(super) fn metres(out: &mut impl Write, record: &FrameRecord<'_>) -> io::Result<()> {
     for track in record.confirmed() {
         let person = &track.estimate.person;
@@ -67,8 +68,8 @@ pub(super) fn metres(out: &mut impl Write, record: &FrameRecord<'_>) -> io::Resu
 /// Header line of `joints.csv`.
 pub(super) const JOINTS_HEADER: &str = "stamp_ns,frame,id,joint,x_px,y_px,score";
 
-/// Writes the lines of `joints.csv` for one frame: each joint of each confirmed track whose joints a
-/// detector found, by its name in COCO.
+/// Writes the lines of `joints.csv` for one frame: each joint of each confirmed track for which a
+/// detector found joints, by its name in COCO.
 pub(super) fn joints(out: &mut impl Write, record: &FrameRecord<'_>) -> io::Result<()> {
     for track in record.confirmed() {
         let Some(joints) = record.joints_of(track) else { continue };
@@ -94,7 +95,7 @@ struct Decimal(f64, usize);
 
 impl std::fmt::Display for Decimal {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        // Smaller values are printed as zero, negative ones with a sign.
+        // Smaller values would be printed as zero, negative ones with a sign.
         let half = 0.5 * 10f64.powi(-(self.1 as i32));
         let value = if self.0.abs() < half { 0.0 } else { self.0 };
         write!(f, "{value:.*}", self.1)

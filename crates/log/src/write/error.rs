@@ -19,7 +19,7 @@ pub enum WriteError {
         /// The path.
         path: PathBuf,
     },
-    /// The log that is read lies in the output directory.
+    /// The log that is read is in the output directory.
     #[error(
         "the log {} lies in the output directory {}; give another directory, so that the log \
          cannot be overwritten",
@@ -32,8 +32,8 @@ pub enum WriteError {
         /// Output directory.
         output: PathBuf,
     },
-    /// Another run, or another program of this kind, is writing there.
-    #[error("another run is writing {}; wait for its end, or give another name", path.display())]
+    /// Another run, or another process of this program, is writing there.
+    #[error("another run is writing {}; wait until it ends, or give another name", path.display())]
     Busy {
         /// Output directory, or file.
         path: PathBuf,
@@ -57,7 +57,7 @@ pub enum WriteError {
 }
 
 impl WriteError {
-    /// Returns true if the request is not allowed, as opposed to a disk that failed.
+    /// Returns true if the request is not allowed, as opposed to a failure of the disk.
     pub fn is_refusal(&self) -> bool {
         matches!(
             self,
@@ -68,7 +68,7 @@ impl WriteError {
         )
     }
 
-    /// Returns true if the disk has no room.
+    /// Returns true if the disk is full.
     pub fn is_disk_full(&self) -> bool {
         let Self::Io { source, .. } = self else { return false };
         matches!(source.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded)
@@ -80,7 +80,8 @@ impl WriteError {
 
     pub(super) fn mcap(path: &Path) -> impl FnOnce(McapError) -> Self + '_ {
         move |source| match source {
-            // The header of a record is written by `binrw`, whose error is called one of parsing.
+            // The header of a record is written by `binrw`, whose errors have the name of parse
+            // errors.
             McapError::Io(source) | McapError::Parse(binrw::Error::Io(source)) => {
                 Self::io(path)(source)
             }

@@ -16,11 +16,11 @@ use crate::msgs::{
     PointCloud2, PoseStamped, SceneUpdate, StringMsg, TFMessage, encode,
 };
 
-/// Maximum number of pose topics: a file has 65,535 channels, and more would not be viewed. Further
-/// people are still in the other topics.
+/// Maximum number of pose topics: a file has 65,535 channels, and no viewer shows more. Further
+/// people are still on the other topics.
 const MAX_POSE_TOPICS: usize = 10_000;
 
-/// Names of the frames that the messages use.
+/// Frame ids of the messages.
 #[derive(Clone, Debug)]
 pub struct FrameNames {
     /// Robot frame, for example `base_link`.
@@ -35,7 +35,7 @@ pub struct FrameNames {
 pub(super) struct McapTracks<W: Write + Seek> {
     writer: Writer<W>,
     frames: FrameNames,
-    /// Part of people that boxes in the image enclose.
+    /// Part of a person that boxes in the image enclose.
     boxes: BoxedPart,
     tracks: Channel,
     json: Channel,
@@ -58,7 +58,7 @@ struct Person {
     body: Body,
 }
 
-/// Topic with its number of messages.
+/// Topic and its number of messages.
 struct Channel {
     id: u16,
     sequence: u32,
@@ -67,8 +67,8 @@ struct Channel {
 impl<W: Write + Seek> McapTracks<W> {
     /// Starts the file; the resolved config becomes the attachment `config.toml`.
     pub fn new(out: W, frames: FrameNames, config: &str) -> McapResult<Self> {
-        // One compression thread: with none the files differ from those with any number, and more
-        // are of no use for so little data.
+        // One compression thread: with none the files differ from those with any number of threads,
+        // and more are not needed for so little data.
         let mut writer = WriteOptions::new()
             .profile("ros2")
             .library(concat!("tagalong ", env!("CARGO_PKG_VERSION")))
@@ -108,7 +108,7 @@ impl<W: Write + Seek> McapTracks<W> {
         })
     }
 
-    /// Returns the writer with boxes of this part of people.
+    /// Returns the writer with boxes that enclose this part of a person.
     pub fn with_boxes(self, boxes: BoxedPart) -> Self {
         Self { boxes, ..self }
     }
@@ -126,7 +126,7 @@ impl<W: Write + Seek> McapTracks<W> {
         self.write_poses(record)
     }
 
-    /// Writes what viewers draw by themselves.
+    /// Writes the messages for visualisation.
     fn write_scene(&mut self, record: &FrameRecord<'_>) -> McapResult<()> {
         let at = record.stamp;
         self.trails.follow(at, record.tracks, record.odom_from_robot);
@@ -158,7 +158,7 @@ impl<W: Write + Seek> McapTracks<W> {
         channel.send(&mut self.writer, at, &encode(&image))
     }
 
-    /// Writes a text to a topic of its own, opened on first use.
+    /// Writes a text to its own topic, which is opened on first use.
     pub fn write_text(&mut self, topic: &str, at: Stamp, data: String) -> McapResult<()> {
         if !self.texts.contains_key(topic) {
             let channel = open::<StringMsg, W>(&mut self.writer, topic)?;
@@ -188,7 +188,7 @@ impl<W: Write + Seek> McapTracks<W> {
         self.write_bodies(record)
     }
 
-    /// Writes the bodies that have changed, and empties those of tracks that have ended.
+    /// Writes the bodies that have changed, and clears those of tracks that have ended.
     fn write_bodies(&mut self, record: &FrameRecord<'_>) -> McapResult<()> {
         let heads: BTreeMap<TrackId, f64> =
             record.confirmed().map(|t| (t.id, record.head_in_odom(t).z)).collect();
@@ -211,12 +211,12 @@ impl<W: Write + Seek> McapTracks<W> {
         self.people.len()
     }
 
-    /// Closes the chunk and hands everything to the operating system.
+    /// Closes the chunk and passes everything to the operating system.
     pub fn flush(&mut self) -> McapResult<()> {
         self.writer.flush()
     }
 
-    /// Writes the end of the file. Without it readers have to recover it.
+    /// Writes the end of the file. Without it readers have to recover the file.
     pub fn finish(mut self, about: BTreeMap<String, String>) -> McapResult<()> {
         self.writer.write_metadata(&Metadata { name: "tagalong".into(), metadata: about })?;
         self.writer.finish()?;
@@ -237,7 +237,7 @@ impl Channel {
     }
 }
 
-/// Returns the topics of a person, opened on first use.
+/// Returns the topics of a person, which are opened on first use.
 fn person<'a, W: Write + Seek>(
     people: &'a mut BTreeMap<TrackId, Person>,
     writer: &mut Writer<W>,

@@ -14,7 +14,7 @@ use crate::msgs::{Message, StringMsg, encode};
 use crate::walk::{Channel, Message as LoggedMessage};
 use crate::{TRUTH_TOPIC, TruthFrame};
 
-/// Writer of any ROS 2 messages to an MCAP file, as a robot's recorder would do it. The file has a
+/// Writer of any ROS 2 messages to an MCAP file, like the recorder of a robot. The file has a
 /// partial name until [`MessageLog::finish`].
 pub struct MessageLog {
     writer: Writer<BufWriter<File>>,
@@ -45,7 +45,7 @@ impl MessageLog {
         Ok(Self { writer, channels: BTreeMap::new(), partial, path: path.to_owned() })
     }
 
-    /// Attaches a text, which [`crate::read_attachment`] finds if it stands before the first message.
+    /// Attaches a text, which [`crate::read_attachment`] finds if it precedes the first message.
     ///
     /// # Errors
     /// [`WriteError::Mcap`].
@@ -60,7 +60,7 @@ impl MessageLog {
         self.writer.attach(&attachment).map_err(WriteError::mcap(&self.partial))
     }
 
-    /// Writes a message; `captured` is its publish time and its log time.
+    /// Writes a message; `captured` is both its publish time and its log time.
     ///
     /// # Errors
     /// [`WriteError::Mcap`].
@@ -77,8 +77,8 @@ impl MessageLog {
         self.put(channel_id, captured, &encode(message))
     }
 
-    /// Writes the truth of an image to [`TRUTH_TOPIC`]; `recorded` is its publish time and its log
-    /// time.
+    /// Writes the truth of an image to [`TRUTH_TOPIC`]; `recorded` is both its publish time and its
+    /// log time.
     ///
     /// # Errors
     /// As for [`MessageLog::send_json`].
@@ -86,7 +86,7 @@ impl MessageLog {
         self.send_json(TRUTH_TOPIC, recorded, truth)
     }
 
-    /// Writes a value as a JSON text; `captured` is its publish time and its log time.
+    /// Writes a value as a JSON text; `captured` is both its publish time and its log time.
     ///
     /// # Errors
     /// [`WriteError::Io`] for a value that JSON cannot express, [`WriteError::Mcap`].
@@ -102,7 +102,7 @@ impl MessageLog {
         self.send(topic, captured, &StringMsg { data })
     }
 
-    /// Writes a message of another log as it is, with its topic, its type and its times.
+    /// Writes a message of another log unchanged, with its topic, type and times.
     ///
     /// # Errors
     /// [`WriteError::Mcap`].
@@ -115,7 +115,7 @@ impl MessageLog {
         self.put_like(channel_id, message, message.data)
     }
 
-    /// Writes a message in place of one of another log, with its topic and its times.
+    /// Writes a message that replaces one of another log, with its topic and times.
     ///
     /// # Errors
     /// [`WriteError::Mcap`].
@@ -171,7 +171,7 @@ impl MessageLog {
         Ok(id)
     }
 
-    /// Completes the file and gives it its name.
+    /// Completes the file and renames it to its final name.
     ///
     /// # Errors
     /// [`WriteError::Io`], [`WriteError::Mcap`].
@@ -181,9 +181,9 @@ impl MessageLog {
     }
 }
 
-/// Opens a file for writing that no other process is writing, and empties it.
+/// Opens a file for writing, unless another process is writing it, and truncates it.
 fn open_alone(path: &Path) -> Result<File, WriteError> {
-    // Emptied only behind the lock, or the file of the other process would be.
+    // Truncated only under the lock, because the file may belong to another process.
     let file = File::options().write(true).create(true).truncate(false).open(path);
     let file = file.map_err(WriteError::io(path))?;
     match file.try_lock() {

@@ -25,11 +25,11 @@ pub(super) const MIN_HEADING_SPEED_MPS: f64 = 0.2;
 const PERSON_WIDTH_M: f64 = 0.6;
 
 /// Returns the confirmed tracks in the robot frame, most certain first, as
-/// `vision_msgs/Detection3DArray` asks.
+/// `vision_msgs/Detection3DArray` requires.
 pub fn detections(record: &FrameRecord<'_>, base_frame: &str) -> Detection3DArray {
     let header = Header::new(record.stamp, base_frame);
     let mut tracks: Vec<&Track> = record.confirmed().collect();
-    // Of equal scores by id, so that the order is always the same.
+    // Tracks with equal scores are sorted by ID, so that the order is always the same.
     tracks.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.id.cmp(&b.id)));
     let detections = tracks.into_iter().map(|track| detection(track, &header)).collect();
     Detection3DArray { header, detections }
@@ -51,7 +51,7 @@ fn detection(track: &Track, header: &Header) -> Detection3D {
     }
 }
 
-/// Returns the box from the floor to the crown.
+/// Returns the box from the floor to the top of the head.
 fn standing_box(head: &Point3<f64>) -> BoundingBox3D {
     // A head far too low must not give a box of negative height.
     let height = (head.z + HALF_HEAD_M).max(0.1);
@@ -96,7 +96,7 @@ pub(super) fn odom_from_person(record: &FrameRecord<'_>, track: &Track) -> Isome
 }
 
 /// Returns the transforms of the robot and all confirmed people in the odometry frame, and of the
-/// camera in that of the robot.
+/// camera in the robot frame.
 pub(super) fn transforms(record: &FrameRecord<'_>, frames: &FrameNames) -> TFMessage {
     let mut transforms = vec![TransformStamped {
         header: Header::new(record.stamp, frames.odom.as_str()),
@@ -126,8 +126,9 @@ pub fn person_transforms(record: &FrameRecord<'_>, odom_frame: &str) -> TFMessag
     TFMessage { transforms: transforms.collect() }
 }
 
-/// Returns the confirmed people on the floor of the odometry frame, as planners with a social cost map
-/// read them. The name is the ID of the track, the reliability the probability that it is a person.
+/// Returns the confirmed people on the floor of the odometry frame, in the format of planners with
+/// a social costmap. The name is the ID of the track, the reliability the probability that it is a
+/// person.
 pub fn people(record: &FrameRecord<'_>, odom_frame: &str) -> People {
     let odom_from_robot = record.odom_from_robot();
     let people = record.confirmed().map(|track| {
@@ -145,7 +146,7 @@ pub fn people(record: &FrameRecord<'_>, odom_frame: &str) -> People {
     People { header: Header::new(record.stamp, odom_frame), people: people.collect() }
 }
 
-/// Data without a field in the standard messages, one object per frame.
+/// Data for which the standard messages have no field, one object per frame.
 #[derive(Serialize)]
 struct FrameJson {
     stamp_ns: u64,
@@ -178,10 +179,11 @@ struct TrackJson {
     raised_hand: Option<bool>,
 }
 
-/// Returns all tracks of a frame as JSON, tentative ones too, with velocity, age and occlusion.
+/// Returns all tracks of a frame as JSON, including tentative ones, with velocity, age and
+/// occlusion.
 ///
 /// # Errors
-/// None that is known: the message has no maps.
+/// Not expected: the message contains no maps.
 pub(super) fn json(record: &FrameRecord<'_>) -> serde_json::Result<String> {
     let frame = FrameJson {
         stamp_ns: record.stamp.nanos(),
@@ -225,7 +227,7 @@ fn joints_json(joints: &Joints) -> BTreeMap<&'static str, [f64; 3]> {
     places
 }
 
-/// Rounds to six decimals: a micrometre, and short enough to read.
+/// Rounds to six decimals, a micrometre, which is short enough to read.
 fn rounded(value: f64) -> f64 {
     // Adding 0 turns a negative zero into a positive one.
     (value * 1e6).round() / 1e6 + 0.0

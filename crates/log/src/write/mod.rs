@@ -1,10 +1,10 @@
-//! Files of a run: `tracks.mcap`, `tracks.csv`, `tracks-metres.csv`, `report.json`,
-//! `timings.json` and `origin.json`, `joints.csv` where a detector finds joints, and
-//! `tracks-smoothed.csv` where it is asked for.
+//! Files of a run: `tracks.mcap`, `tracks.csv`, `tracks-metres.csv`, `report.json`, `timings.json`
+//! and `origin.json`, `joints.csv` if a detector finds joints, and `tracks-smoothed.csv` if it is
+//! requested.
 //!
 //! All are written under partial names and get their final names together at the end of the run, so
 //! that the files of a crash are never mistaken for a result. At least once per second of log time
-//! everything written so far is handed to the operating system, so that a killed run loses no more
+//! everything written so far is passed to the operating system, so that a killed run loses no more
 //! than that. The contents do not depend on the time of day: the same frames give the same bytes.
 
 mod body;
@@ -52,9 +52,9 @@ const FLUSH_EVERY_S: f64 = 1.0;
 pub struct RunTexts<'a> {
     /// `report.json`: results, the same for the same log, config and seed.
     pub report: &'a str,
-    /// `timings.json`: times, different each time.
+    /// `timings.json`: processing times, different in each run.
     pub timings: &'a str,
-    /// `origin.json`: paths of the log and the config, different in each place.
+    /// `origin.json`: paths of the log and the config, which depend on the machine.
     pub origin: &'a str,
 }
 
@@ -65,15 +65,15 @@ pub struct TrackLog {
     mcap: McapTracks<BufWriter<File>>,
     boxes: BufWriter<File>,
     metres: BufWriter<File>,
-    /// Opened by the first joints.
+    /// Opened when the first joints arrive.
     joints: Option<BufWriter<File>>,
-    /// IDs that were wrong, for `tracks-smoothed.csv`; `None` where that is not wanted.
+    /// Corrections of wrong IDs, for `tracks-smoothed.csv`; `None` if that file is not wanted.
     corrections: Option<Vec<Correction>>,
     flushed: Option<Stamp>,
 }
 
 impl TrackLog {
-    /// Opens the files. `config` is the resolved config, attached to the log.
+    /// Opens the files. `config` is the resolved config, which is attached to the log.
     ///
     /// # Errors
     /// [`WriteError`], which names the file.
@@ -101,15 +101,15 @@ impl TrackLog {
         })
     }
 
-    /// Adds `tracks-smoothed.csv` to the files: `tracks.csv` with the IDs put right that later frames
-    /// show to be wrong. It is no result that was there in time.
+    /// Adds `tracks-smoothed.csv` to the files: `tracks.csv` with the IDs corrected that later
+    /// frames show to be wrong. It is not an online result.
     #[must_use]
     pub fn with_smoothed(mut self) -> Self {
         self.corrections = Some(Vec::new());
         self
     }
 
-    /// Notes that two IDs are the wrong way round in frames before `noticed`, from `since` on.
+    /// Notes that two IDs are exchanged in frames before `noticed`, from `since` on.
     pub fn correct(&mut self, since: u64, noticed: u64, ids: [TrackId; 2]) {
         let correction = Correction { frames: since..noticed, ids: ids.map(|id| id.0) };
         self.corrections.iter_mut().for_each(|all| all.push(correction.clone()));
@@ -123,7 +123,7 @@ impl TrackLog {
     /// Writes one frame.
     ///
     /// # Errors
-    /// [`WriteError`]; the log must not be used after one.
+    /// [`WriteError`]; the track log must not be used after one.
     pub fn write(&mut self, record: &FrameRecord<'_>) -> Result<(), WriteError> {
         self.mcap.write(record).map_err(WriteError::mcap(&self.file("tracks.mcap")))?;
         csv::boxes(&mut self.boxes, record, &self.output)
@@ -192,11 +192,11 @@ impl TrackLog {
         self.joints.iter_mut().try_for_each(|out| out.flush()).map_err(WriteError::io(&path))
     }
 
-    /// Ends the files, adds the report, the timings, the origin and `about` (as metadata of the log), and gives
-    /// all files their final names. Returns the directory.
+    /// Completes the files, adds the report, the timings, the origin and `about` (as metadata of
+    /// the log), and gives all files their final names. Returns the directory.
     ///
     /// # Errors
-    /// [`WriteError`]; the partial files stay.
+    /// [`WriteError`]; the partial files are kept.
     pub fn finish(
         mut self,
         about: BTreeMap<String, String>,
@@ -220,8 +220,8 @@ impl TrackLog {
         Ok(path)
     }
 
-    /// Removes the files written, and the directory if it is empty then: for a run that failed
-    /// before its first frame.
+    /// Removes the files that were written, and then the directory if it is empty: for a run that
+    /// failed before its first frame.
     ///
     /// # Errors
     /// [`WriteError::Io`].

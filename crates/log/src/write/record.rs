@@ -9,13 +9,13 @@ settings! {
     /// Settings of the output, `[output]` of a config.
     #[non_exhaustive]
     pub struct OutputSettings {
-        /// Time for which confirmed tracks stay in `tracks.csv` while unseen, s. With 0 a track is
-        /// written only in frames in which the person was seen.
+        /// Time for which confirmed tracks are still written to `tracks.csv` while they are not
+        /// seen, s. With 0 a track is written only in frames in which the person was seen.
         #[schemars(range(min = 0.0))]
         pub report_unseen_s: f64 = 0.0,
         /// Part of a person that boxes in `tracks.csv` and in the images of `tracks.mcap` enclose:
-        /// `upper`, head and shoulders, as they are tracked; `full`, the whole person, whose feet
-        /// are on the floor below the head.
+        /// `upper`, head and shoulders, as they are tracked; `full`, the whole person, with the
+        /// feet on the floor below the head.
         pub boxes: BoxedPart = BoxedPart::Upper,
     }
 }
@@ -26,14 +26,14 @@ settings! {
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum BoxedPart {
-    /// Head and shoulders, or the box that is tracked where that is a whole person.
+    /// Head and shoulders, or the whole person if that is the tracked box.
     #[default]
     Upper,
     /// The whole person.
     Full,
 }
 
-/// Contents of the files of a run about one frame.
+/// Data of one frame for the files of a run.
 #[derive(Clone, Copy)]
 pub struct FrameRecord<'a> {
     /// 1-based index of the frame in the log.
@@ -44,13 +44,13 @@ pub struct FrameRecord<'a> {
     pub camera: &'a Camera,
     /// Pose of the robot in the odometry frame.
     pub odom_from_robot: &'a Isometry2<f64>,
-    /// False if there is odometry and it cannot be used, so that no place in its frame is known.
+    /// False if there is odometry but it cannot be used, so that no position in its frame is known.
     pub is_odom_known: bool,
     /// All tracks, confirmed or not.
     pub tracks: &'a [Track],
-    /// Joints of tracks in the image, where a detector found them.
+    /// Joints of tracks in the image, if a detector found them.
     pub joints: &'a [(TrackId, Arc<Joints>)],
-    /// Track of the person that is followed.
+    /// Track of the followed person.
     pub target: Option<TrackId>,
     /// Commanded wheel speeds, if there is a controller.
     pub command: Option<WheelSpeeds>,
@@ -63,8 +63,7 @@ impl FrameRecord<'_> {
         found.map(|(_, joints)| joints.as_ref())
     }
 
-    /// Returns the direction in which the body of a track is turned, rad in the robot frame, if its
-    /// joints show it.
+    /// Returns the heading of the body of a track, rad in the robot frame, if its joints show it.
     pub(super) fn body_direction_rad(&self, track: &Track) -> Option<f64> {
         let at = track.estimate.person.position;
         self.joints_of(track)?.body_direction_rad(at.y.atan2(at.x))
@@ -90,7 +89,8 @@ impl FrameRecord<'_> {
         self.odom_from_robot() * track.estimate.person.position
     }
 
-    /// Returns the box of a part of a track's person inside the image; `None` if it lies outside.
+    /// Returns the box of a part of a track's person, clipped to the image; `None` if it lies
+    /// outside.
     pub(super) fn visible_region(&self, track: &Track, part: BoxedPart) -> Option<Rect> {
         let region = match part {
             BoxedPart::Upper => track.estimate.region,

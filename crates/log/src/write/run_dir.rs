@@ -7,17 +7,18 @@ use super::WriteError;
 
 /// Directory of one run.
 ///
-/// Files are written under `NAME.partial` and get their names together at the end of the run: a
-/// file with its final name is complete.
+/// Files are written under `NAME.partial` and renamed together at the end of the run: a file with
+/// its final name is complete.
 #[derive(Debug)]
 pub struct RunDir {
     path: PathBuf,
     pending: Vec<String>,
-    /// Lock of the directory, which ends with the process; `None` where the file system has none.
+    /// Lock of the directory, which is released when the process ends; `None` if the file system
+    /// has no locks.
     _lock: Option<File>,
 }
 
-/// Names of the files of a run, and of its page; only these are ever removed.
+/// Names of the files of a run, and of its page; no others are ever removed.
 const OWN_FILES: [&str; 9] = [
     "tracks.mcap",
     "tracks.csv",
@@ -34,13 +35,13 @@ const OWN_FILES: [&str; 9] = [
 const OVERLAY: &str = "overlay";
 
 impl RunDir {
-    /// Checks a path as [`RunDir::create`] would, and changes nothing.
+    /// Checks a path as [`RunDir::create`] would, without changing anything.
     ///
     /// # Errors
     /// [`WriteError::Exists`] if the directory is not empty and `overwrite` is not set,
-    /// [`WriteError::InputInside`] if `input` lies in it, [`WriteError::NotADirectory`],
-    /// [`WriteError::Busy`] if another run is writing into it. The partial files that a killed run
-    /// left are no contents.
+    /// [`WriteError::InputInside`] if `input` is inside it, [`WriteError::NotADirectory`],
+    /// [`WriteError::Busy`] if another run is writing into it. Partial files left by a killed run
+    /// do not count as contents.
     pub fn check(path: &Path, overwrite: bool, input: &Path) -> Result<(), WriteError> {
         Self::check_contents(path, overwrite, input)?;
         if path.exists() { lock(path).map(drop) } else { Ok(()) }
@@ -50,7 +51,7 @@ impl RunDir {
         if path.exists() && !path.is_dir() {
             return Err(WriteError::NotADirectory { path: path.to_owned() });
         }
-        // Canonical paths, because links and `..` could hide that the log lies inside.
+        // Canonical paths, because links and `..` could hide that the log is inside.
         if let (Ok(output), Ok(log)) = (path.canonicalize(), input.canonicalize())
             && log.starts_with(&output)
         {
@@ -66,7 +67,7 @@ impl RunDir {
         Err(WriteError::Exists { path: path.to_owned() })
     }
 
-    /// Creates the directory, or removes the files of an earlier run from it; foreign files stay.
+    /// Creates the directory, or removes the files of an earlier run from it; other files are kept.
     ///
     /// # Errors
     /// As [`RunDir::check`], and [`WriteError::Io`].
@@ -74,7 +75,7 @@ impl RunDir {
         Self::check_contents(path, overwrite, input)?;
         fs::create_dir_all(path).map_err(WriteError::io(path))?;
         let lock = lock(path)?;
-        // Another run may have ended there meanwhile.
+        // Checked again under the lock, because another run may have ended there in the meantime.
         Self::check_contents(path, overwrite, input)?;
         for name in OWN_FILES {
             remove(&path.join(name))?;
@@ -110,7 +111,7 @@ impl RunDir {
         Ok(BufWriter::new(file))
     }
 
-    /// Writes a whole small file under its partial name.
+    /// Writes a small file as a whole under its partial name.
     ///
     /// # Errors
     /// [`WriteError::Io`].
@@ -141,16 +142,16 @@ impl RunDir {
         for name in &self.pending {
             remove(&self.path.join(partial(name)))?;
         }
-        // A folder with other files in it stays, and that is no error.
+        // A folder with other files in it is kept, which is not an error.
         let _ = fs::remove_dir(self.path.join(OVERLAY));
         let _ = fs::remove_dir(&self.path);
         Ok(())
     }
 }
 
-/// Locks a directory against other runs, as long as the result lives.
+/// Locks a directory against other runs, for the lifetime of the result.
 fn lock(path: &Path) -> Result<Option<File>, WriteError> {
-    // Some systems do not open directories, and some file systems have no locks.
+    // Some systems cannot open directories, and some file systems have no locks.
     let Ok(folder) = File::open(path) else { return Ok(None) };
     match folder.try_lock() {
         Ok(()) => Ok(Some(folder)),
@@ -159,7 +160,7 @@ fn lock(path: &Path) -> Result<Option<File>, WriteError> {
     }
 }
 
-/// Returns true for a directory that is empty or holds nothing but what a killed run left.
+/// Returns true for a directory that is empty or contains only files left by a killed run.
 fn holds_no_results(path: &Path) -> std::io::Result<bool> {
     let mut has_partial = false;
     let mut has_pictures = false;

@@ -1,5 +1,5 @@
-//! People of one frame as shapes that viewers draw by themselves: an upright cylinder with the ID and
-//! the distance above it, an arrow to the place in one second and the trail on the floor, and boxes
+//! People of one frame as shapes for viewers: an upright cylinder with the ID and the distance
+//! above it, an arrow to the predicted position in one second and the trail on the floor, and boxes
 //! in the image.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
@@ -19,7 +19,7 @@ use crate::msgs::{
 /// Diameter of a person, m.
 const PERSON_WIDTH_M: f64 = 0.5;
 
-/// Height of the number, and of its centre above the crown, m.
+/// Height of the label, and of its centre above the top of the head, m.
 const TEXT_M: f64 = 0.25;
 
 /// Width of the arrow, m.
@@ -28,24 +28,24 @@ const ARROW_WIDTH_M: f64 = 0.06;
 /// Width of the trail, and its height above the floor, m.
 const TRAIL_M: f64 = 0.03;
 
-/// Time after which shapes disappear by themselves: a viewer that misses the last message must not
-/// show people who are gone.
+/// Time after which shapes disappear: a viewer that misses the last message must not show people
+/// that are gone.
 const LIFETIME: Time = Time { sec: 1, nanosec: 0 };
 
-/// Opacity of a person that is seen, and of one that is predicted only.
+/// Opacity of a person that is seen, and of one that is only predicted.
 const OPACITY: (f64, f64) = (0.8, 0.3);
 
-/// Shape of one person, in the odometry frame.
+/// Shapes of one person, in the odometry frame.
 struct Figure {
     id: u32,
     /// Centre of the upright cylinder.
     middle: Isometry3<f64>,
     height_m: f64,
-    /// Place of the number.
+    /// Position of the label.
     top: Isometry3<f64>,
-    /// Pose of the arrow's tail along the direction of walking, and its length; none at rest.
+    /// Pose of the arrow's tail along the direction of walking, and its length; `None` at rest.
     arrow: Option<(Isometry3<f64>, f64)>,
-    /// Ends of the lines of the trail, in pairs; none while the person is not seen.
+    /// Ends of the lines of the trail, in pairs; empty while the person is not seen.
     trail: Vec<Point>,
     /// ID and distance.
     label: String,
@@ -102,8 +102,8 @@ fn figures(record: &FrameRecord<'_>, trails: &Trails) -> Vec<Figure> {
     record.confirmed().map(|track| Figure::of(record, track, trails)).collect()
 }
 
-/// Returns the confirmed people as markers in the odometry frame; those of the frame before are
-/// removed first, and all disappear by themselves after a second.
+/// Returns the confirmed people as markers in the odometry frame; those of the previous frame are
+/// removed first, and all disappear after a second without a new message.
 pub fn markers(record: &FrameRecord<'_>, trails: &Trails, odom_frame: &str) -> MarkerArray {
     let header = Header::new(record.stamp, odom_frame);
     let mut markers = vec![clear_marker(&header)];
@@ -126,7 +126,7 @@ fn figure_markers(figure: &Figure, header: &Header) -> Vec<Marker> {
     let Color { r, g, b, a } = figure.colour;
     let opaque = Marker {
         header: header.clone(),
-        // Beyond 2^31 numbers repeat, which no run reaches.
+        // IDs repeat beyond 2^31, which no run reaches.
         id: figure.id as i32,
         action: Marker::ADD,
         pose: (&Isometry3::identity()).into(),
@@ -158,7 +158,7 @@ fn figure_markers(figure: &Figure, header: &Header) -> Vec<Marker> {
         shape: Marker::ARROW,
         ..opaque.clone()
     });
-    // Viewers report lines without points as faulty.
+    // Viewers report an error for lines without points.
     let trail = (!figure.trail.is_empty()).then(|| Marker {
         points: figure.trail.clone(),
         // The width of the lines.
@@ -174,13 +174,13 @@ fn tip(tail: &Isometry3<f64>, length: f64) -> Point {
     point(&(tail * Point3::new(length, 0.0, 0.0)))
 }
 
-/// Returns a point, rounded to a micrometre as the turn by a heading is not exact.
+/// Returns a point, rounded to a micrometre because the rotation by a heading is not exact.
 fn point(at: &Point3<f64>) -> Point {
     let [x, y, z] = [at.x, at.y, at.z].map(|v| (v * 1e6).round() / 1e6);
     Point { x, y, z }
 }
 
-/// Returns the confirmed people as a scene; those of the frame before are removed first.
+/// Returns the confirmed people as a scene; those of the previous frame are removed first.
 pub(super) fn scene(record: &FrameRecord<'_>, trails: &Trails, odom_frame: &str) -> SceneUpdate {
     let timestamp = record.stamp.into();
     let clear =
@@ -213,7 +213,7 @@ pub(super) fn scene(record: &FrameRecord<'_>, trails: &Trails, odom_frame: &str)
 }
 
 fn arrow(tail: &Isometry3<f64>, length: f64, figure: &Figure) -> ArrowPrimitive {
-    // The tip is a part of the whole length, which is the way of one second.
+    // The tip is part of the whole length, which is the distance walked in one second.
     let head_length = (0.3 * length).min(0.2);
     ArrowPrimitive {
         pose: tail.into(),
@@ -283,7 +283,7 @@ pub(super) fn annotations(record: &FrameRecord<'_>, part: BoxedPart) -> ImageAnn
     out
 }
 
-/// Returns the calibration of the camera; none without a lens that the message can describe.
+/// Returns the calibration of the camera; `None` without a lens that the message can describe.
 pub(super) fn camera_info(record: &FrameRecord<'_>, frame: &str) -> Option<CameraInfo> {
     let Lens::Pinhole(lens) = &record.camera.lens else { return None };
     let header = Header::new(record.stamp, frame);

@@ -1,19 +1,19 @@
-//! `tracks-smoothed.csv`: the boxes of a run with IDs that later frames put right.
+//! `tracks-smoothed.csv`: the boxes of a run with IDs corrected by later frames.
 
 use std::io::{self, BufRead, Write};
 use std::ops::Range;
 
-/// Two IDs that are the wrong way round in some frames.
+/// Two IDs that are exchanged in some frames.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Correction {
-    /// Frames in which they are.
+    /// Frames in which they are exchanged.
     pub(super) frames: Range<u64>,
     /// The two IDs.
     pub(super) ids: [u32; 2],
 }
 
 impl Correction {
-    /// Returns the right ID in place of one of a frame.
+    /// Returns the corrected ID for one of a frame.
     fn applied(&self, frame: u64, id: u32) -> u32 {
         let [first, second] = self.ids;
         if !self.frames.contains(&frame) {
@@ -28,7 +28,7 @@ impl Correction {
     }
 }
 
-/// Copies the rows of `tracks.csv`, with the corrections applied one after the other.
+/// Copies the rows of `tracks.csv` and applies the corrections one after the other.
 ///
 /// # Errors
 /// Reading or writing fails, or a row does not begin with a frame and an ID.
@@ -45,7 +45,8 @@ pub(super) fn write(
         let (Some(frame), Some(id), Some(rest)) = (frame, id, cells.next()) else {
             return Err(io::Error::new(io::ErrorKind::InvalidData, format!("a row `{row}`")));
         };
-        // In the order in which they were noticed: a later one means the IDs that an earlier one left.
+        // In the order in which they were noticed, because a later one refers to the IDs after the
+        // earlier ones.
         let id = corrections.iter().fold(id, |id, correction| correction.applied(frame, id));
         writeln!(out, "{frame},{id},{rest}")?;
     }

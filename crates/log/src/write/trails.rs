@@ -3,10 +3,10 @@ use std::collections::{BTreeMap, VecDeque};
 use nalgebra::{Isometry2, Point3};
 use tagalong_core::{Stamp, Track, TrackId};
 
-/// Time that a trail reaches back, s.
+/// Duration that a trail covers, s.
 const LENGTH_S: f64 = 2.0;
 
-/// Longest time without a sighting that a line of a trail bridges, s.
+/// Maximum time without a detection that a line of a trail bridges, s.
 const GAP_S: f64 = 0.5;
 
 /// Head of a person that was seen, in the odometry frame.
@@ -23,14 +23,14 @@ pub struct Trails {
 }
 
 impl Trails {
-    /// Adds the positions of a frame and forgets tracks that ended.
+    /// Adds the positions of a frame and removes tracks that ended.
     pub fn follow(&mut self, now: Stamp, tracks: &[Track], odom_from_robot: &Isometry2<f64>) {
         self.places.retain(|id, _| tracks.iter().any(|track| track.id == *id));
-        // A predicted position is no place at which the person was.
+        // A predicted position is not one where the person really was.
         for track in tracks.iter().filter(|track| track.confirmed && track.seen) {
             let trail = self.places.entry(track.id).or_default();
             let head = track.estimate.person.position;
-            // Kept in the odometry frame, because the robot frame moves under the trail.
+            // Stored in the odometry frame, because the robot frame moves under the trail.
             let floor = odom_from_robot * head.xy();
             trail.push_back(Place { at: now, head: Point3::new(floor.x, floor.y, head.z) });
         }
@@ -39,7 +39,7 @@ impl Trails {
         }
     }
 
-    /// Returns the trail of a track in pieces without gaps; at least one, which may be empty.
+    /// Returns the trail of a track as pieces without gaps; at least one, which may be empty.
     pub fn pieces(&self, id: TrackId) -> Vec<Vec<Point3<f64>>> {
         let mut pieces = Vec::new();
         let mut piece = Vec::new();

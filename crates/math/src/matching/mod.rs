@@ -1,11 +1,10 @@
-//! Exact assignment of rows to columns: truths to reports in the metrics, tracks to detections in
-//! the tracker.
+//! Exact assignment of rows to columns: ground truth to reported people in the metrics, tracks to
+//! detections in the tracker.
 //!
-//! Frames are sparse: most pairs do not touch at all. The matcher therefore
-//! takes only the pairs that do, splits them into groups that cannot influence
-//! each other, answers the trivial groups at sight and solves the others by
-//! shortest augmenting paths (Jonker and Volgenant, Computing 38, 1987), which
-//! costs O(rows² · columns) per group.
+//! Frames are sparse: most pairs do not overlap at all. The matcher therefore takes only the pairs
+//! that do, splits them into independent groups, solves the trivial groups directly and the others
+//! by shortest augmenting paths (Jonker and Volgenant, Computing 38, 1987), which costs O(rows² ·
+//! columns) per group.
 
 /// Pair that may be matched, and its weight.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -14,16 +13,16 @@ pub struct Edge {
     pub row: u32,
     /// Index of the column (report, detection).
     pub col: u32,
-    /// Worth of the match; pairs at or below zero are never matched.
+    /// Benefit of the match; pairs at or below zero are never matched.
     pub weight: f64,
 }
 
 const NONE: u32 = u32::MAX;
 
-/// Matrices up to this size are solved sooner than groups are found in them.
+/// Number of pairs up to which solving the whole matrix is faster than finding its groups.
 const FEW_PAIRS: usize = 600;
 
-/// Finds the matching of greatest total weight; keeps its memory between calls.
+/// Finds the matching of greatest total weight; reuses its buffers between calls.
 #[derive(Debug, Default)]
 pub struct Matcher {
     parent: Vec<u32>,
@@ -37,16 +36,15 @@ pub struct Matcher {
 }
 
 impl Matcher {
-    /// A matcher without any memory yet.
+    /// Creates a matcher with empty buffers.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// The matching of greatest total weight among `rows` rows and `cols`
-    /// columns: indices into `edges`, in the order of the rows. Each row and
-    /// column is used at most once; several edges for one pair are not allowed.
-    /// Among equally good matchings the choice depends only on the order of the
-    /// edges.
+    /// Fills `matched` with the matching of greatest total weight between `rows` rows and `cols`
+    /// columns: indices into `edges`, in the order of the rows. Each row and column is used at most
+    /// once; there must not be several edges for one pair. Which of several equally good matchings
+    /// is returned depends only on the order of the edges.
     pub fn best(&mut self, rows: usize, cols: usize, edges: &[Edge], matched: &mut Vec<u32>) {
         matched.clear();
         self.group(rows, cols, edges);
@@ -63,8 +61,8 @@ impl Matcher {
         matched.sort_unstable_by_key(|&e| edges[e as usize].row);
     }
 
-    /// The same of a matrix of weights, row by row: the column of each row. Pairs at or below zero
-    /// are never matched, and the rest holds as for [`Matcher::best`].
+    /// Does the same for a matrix of weights, row by row: fills in the column of each row. Pairs at
+    /// or below zero are never matched; otherwise see [`Matcher::best`].
     ///
     /// ```
     /// use tagalong_math::matching::Matcher;
@@ -87,7 +85,7 @@ impl Matcher {
         col_of
     }
 
-    /// Solves a sparse matrix by its groups.
+    /// Solves a sparse matrix group by group.
     fn match_groups(
         &mut self,
         rows: usize,
@@ -110,7 +108,7 @@ impl Matcher {
         self.edges = edges;
     }
 
-    /// Solves a matrix as a whole, without a search for groups.
+    /// Solves a matrix as a whole, without looking for groups.
     fn match_all(
         &mut self,
         rows: usize,
@@ -139,15 +137,14 @@ impl Matcher {
         }
     }
 
-    /// Fills `order` with the useful edges, those of one group side by side,
-    /// and `parent` with the group of each node.
+    /// Fills `order` with the useful edges, grouped, and `parent` with the group of each node.
     fn group(&mut self, rows: usize, cols: usize, edges: &[Edge]) {
         reset(&mut self.local, rows + cols, NONE);
         self.order.clear();
         let useful = (0..).zip(edges).filter(|(_, edge)| edge.weight > 0.0);
         self.order.extend(useful.map(|(e, _)| e));
         self.parent.clear();
-        // With an edge for every pair there is one group, which need not be searched for.
+        // With an edge for every pair there is only one group.
         if self.order.len() == rows * cols {
             self.parent.resize(rows + cols, 0);
             return;
@@ -203,8 +200,8 @@ impl Matcher {
         }));
     }
 
-    /// Returns the row and the column of an edge in the matrix of its group, which is not higher
-    /// than wide.
+    /// Returns the row and the column of an edge in the matrix of its group, transposed if that has
+    /// more rows than columns.
     #[inline]
     fn place_in_group(&self, edge: &Edge, rows: usize) -> (usize, usize) {
         let r = self.local[edge.row as usize] as usize;
@@ -223,7 +220,7 @@ impl Matcher {
     }
 }
 
-/// Returns the group of an edge, by the node that stands for it.
+/// Returns the group of an edge, by its representative node.
 #[inline]
 fn group_of(parent: &[u32], edges: &[Edge], edge: u32) -> u32 {
     parent[edges[edge as usize].row as usize]
@@ -236,7 +233,7 @@ fn number(local: &mut u32, node: u32, list: &mut Vec<u32>) {
     }
 }
 
-/// The heaviest edge of a group, the first of several.
+/// Returns the heaviest edge of a group, the first of several.
 fn heaviest(edges: &[Edge], group: &[u32]) -> Option<u32> {
     group
         .iter()
@@ -244,18 +241,19 @@ fn heaviest(edges: &[Edge], group: &[u32]) -> Option<u32> {
         .reduce(|a, b| if edges[b as usize].weight > edges[a as usize].weight { b } else { a })
 }
 
-/// Dense assignment of every row to a column of its own at least total cost: the columns that are
-/// cheapest first, then shortest augmenting paths for the rows that are left.
+/// Dense assignment of every row to a different column at minimum total cost: rows first take their
+/// cheapest columns, then shortest augmenting paths place the remaining rows.
 #[derive(Debug, Default)]
 struct Solver {
     row_price: Vec<f64>,
     col_price: Vec<f64>,
     /// Row of each column, or `NONE`.
     row_of: Vec<u32>,
-    /// Column before each one on the path to it, or `NONE`; as wide as the distances, because
-    /// vector instructions convert slowly between widths.
+    /// Predecessor of each column on the path to it, or `NONE`; of the same width as the distances,
+    /// because vector instructions convert slowly between widths.
     previous: Vec<u64>,
-    /// Cost of the path to each column; NaN once it is final, which is less than nothing.
+    /// Cost of the path to each column; NaN once it is final, because no comparison with NaN is
+    /// true.
     distance: Vec<f64>,
     /// Columns whose distance is final.
     settled: Vec<(u32, f64)>,
@@ -264,7 +262,7 @@ struct Solver {
 }
 
 impl Solver {
-    /// `rows <= cols`; `cost` is row by row. The answer is in `row_of`.
+    /// Solves a matrix with `rows <= cols`; `cost` is row by row. The result is in `row_of`.
     fn solve(&mut self, rows: usize, cols: usize, cost: &[f64]) {
         reset(&mut self.row_price, rows, 0.0);
         reset(&mut self.col_price, cols, 0.0);
@@ -277,7 +275,7 @@ impl Solver {
         self.open = open;
     }
 
-    /// Gives each row its cheapest column while that is free; the others stay open.
+    /// Gives each row its cheapest column if that is still free; the other rows stay unassigned.
     fn take_cheapest(&mut self, cols: usize, cost: &[f64]) {
         self.open.clear();
         for (row, costs) in cost.chunks(cols).enumerate() {
@@ -290,11 +288,12 @@ impl Solver {
         }
     }
 
-    /// Lets open rows outbid the holders of their cheapest columns (augmenting row reduction of
-    /// Jonker and Volgenant). A column that has a row keeps one, so that free ones cost nothing.
+    /// Lets unassigned rows outbid the holders of their cheapest columns (augmenting row reduction
+    /// of Jonker and Volgenant). A column that has a row keeps one, so that the price of a free
+    /// column stays 0.
     fn reduce(&mut self, cols: usize, cost: &[f64]) {
         self.left.clear();
-        // A row that is outbid again and again is cheaper to place by a path.
+        // A row that is outbid repeatedly is cheaper to place by a path.
         let mut bids = 2 * self.row_price.len();
         while let Some(row) = self.open.pop() {
             if bids == 0 {
@@ -366,11 +365,12 @@ impl Solver {
     }
 }
 
-/// Number of minima at once: a single one is a chain of dependent comparisons.
+/// Number of minima that are computed at once: a single one would be a chain of dependent
+/// comparisons.
 const LANES: usize = 8;
 
-/// Returns the cheapest column at the prices, the first of several, with its cost and that of the
-/// next.
+/// Returns the column that is cheapest at these prices (the first of several), its cost, and the
+/// cost of the second cheapest.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn two_cheapest(costs: &[f64], prices: &[f64]) -> (usize, f64, f64) {
     let (chunks, rest) = costs.as_chunks::<LANES>();
@@ -382,7 +382,7 @@ fn two_cheapest(costs: &[f64], prices: &[f64]) -> (usize, f64, f64) {
             add_cost(costs[lane] - prices[lane], &mut firsts[lane], &mut seconds[lane]);
         }
     }
-    // Halved again and again, the lanes are compared side by side until one is left.
+    // The lanes are compared in halves until one is left.
     let mut half = if chunks.is_empty() { 0 } else { LANES / 2 };
     while half > 0 {
         for lane in 0..half {
@@ -409,7 +409,7 @@ fn two_cheapest(costs: &[f64], prices: &[f64]) -> (usize, f64, f64) {
     (from.wrapping_add(place), first, second)
 }
 
-/// Keeps the least cost so far and the next.
+/// Updates the two lowest costs so far.
 #[inline(always)]
 fn add_cost(cost: f64, first: &mut f64, second: &mut f64) {
     let more = if cost < *first { *first } else { cost };
@@ -417,7 +417,8 @@ fn add_cost(cost: f64, first: &mut f64, second: &mut f64) {
     *first = if cost < *first { cost } else { *first };
 }
 
-/// Returns true if a test holds in any lane; written without an early end, for vector instructions.
+/// Returns true if a test holds in any lane; it has no early exit, so that it becomes vector
+/// instructions.
 #[inline(always)]
 fn any(test: impl Fn(usize) -> bool) -> bool {
     let mut found = 0;
@@ -427,7 +428,7 @@ fn any(test: impl Fn(usize) -> bool) -> bool {
     found != 0
 }
 
-/// Shortens the distances by the columns that are reached over the column `via`.
+/// Shortens the distances of the columns that are reached through the column `via`.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn relax(
     costs: &[f64],
@@ -446,7 +447,7 @@ fn relax(
     }
 }
 
-/// Returns the least value with its first place; NaN counts as none.
+/// Returns the least value and its first index; NaN is ignored.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn least(values: &[f64]) -> (usize, f64) {
     let (chunks, rest) = values.as_chunks::<LANES>();

@@ -1,10 +1,10 @@
 //! Changes to the bytes of an ONNX file for the runtime `rten`.
 //!
-//! `rten` 0.27 divides by a tensor with one number as by a scalar, and so forgets its dimensions:
-//! `Div` of a scalar by a tensor [1] is a scalar there and a tensor [1] by the standard. Networks
-//! that compute with their own sizes (`4 / height`, as tf2onnx writes MoveNet) then fail at an
-//! `Unsqueeze` or a `Concat` further on. A constant that is divided is multiplied by the reciprocal
-//! instead, which keeps dimensions.
+//! `rten` 0.27 treats a divisor with one value as a scalar, and so loses its dimensions: `Div` of a
+//! scalar by a tensor [1] gives a scalar there, but a tensor [1] by the standard. Networks that
+//! compute with their own sizes (`4 / height`, as tf2onnx writes MoveNet) then fail at a later
+//! `Unsqueeze` or `Concat`. Therefore a constant that is divided is instead multiplied by the
+//! reciprocal, which keeps the dimensions.
 
 use std::collections::BTreeSet;
 
@@ -12,7 +12,7 @@ use crate::survey::{Content, Fields};
 
 /// Wire type of a field with a length.
 const LENGTH_DELIMITED: u64 = 2;
-/// Fields of the messages, by `onnx.proto`.
+/// Field numbers of the messages in `onnx.proto`.
 const MODEL_GRAPH: u64 = 7;
 const GRAPH_NODE: u64 = 1;
 const GRAPH_CONSTANT: u64 = 5;
@@ -28,8 +28,8 @@ const ATTRIBUTE_TENSOR: u64 = 5;
 /// Type of a tensor of floating point numbers.
 const FLOAT: u64 = 1;
 
-/// Returns the bytes of a file in which constants are divided by way of reciprocals. Bytes that
-/// cannot be read are returned as they are.
+/// Returns the bytes of a file in which divisions of constants are replaced by multiplications with
+/// reciprocals. Bytes that cannot be read are returned unchanged.
 pub(crate) fn without_scalar_division(file: Vec<u8>) -> Vec<u8> {
     rewritten(&file).unwrap_or(file)
 }
@@ -70,7 +70,7 @@ fn rewritten_graph(graph: &[u8]) -> Option<Vec<u8>> {
     is_changed.then_some(out)
 }
 
-/// Returns the names of the constants that are one floating point number without dimensions.
+/// Returns the names of the constants that are a single floating point number without dimensions.
 fn scalars_of(graph: &[u8]) -> BTreeSet<&[u8]> {
     let mut scalars = BTreeSet::new();
     for (_, number, content) in spans(graph) {
@@ -103,7 +103,7 @@ fn is_scalar(tensor: &[u8]) -> bool {
     is_float
 }
 
-/// Returns the operators in place of one that divides a constant; `None` for any other.
+/// Returns the operators that replace the division of a constant; `None` for any other operator.
 fn reciprocal(node: &[u8], scalars: &BTreeSet<&[u8]>) -> Option<[Vec<u8>; 2]> {
     if bytes_of(node, NODE_KIND).next() != Some(b"Div") {
         return None;
@@ -130,7 +130,7 @@ fn operator(kind: &[u8], inputs: &[&[u8]], output: &[u8], name: &[u8]) -> Vec<u8
     node
 }
 
-/// Returns the contents of all fields of a number that have bytes.
+/// Returns the contents of all fields with this number that contain bytes.
 fn bytes_of(message: &[u8], wanted: u64) -> impl Iterator<Item = &[u8]> {
     spans(message).filter_map(move |(_, number, content)| match content {
         Content::Bytes(bytes) if number == wanted => Some(bytes),
@@ -138,7 +138,7 @@ fn bytes_of(message: &[u8], wanted: u64) -> impl Iterator<Item = &[u8]> {
     })
 }
 
-/// Returns the fields of a message, each with its own bytes; after damage there are no more.
+/// Returns the fields of a message, each with its own bytes; it ends at a damaged one.
 fn spans(message: &[u8]) -> impl Iterator<Item = (&[u8], u64, Content<'_>)> {
     let mut fields = Fields(message);
     std::iter::from_fn(move || {

@@ -70,7 +70,7 @@ impl ConfigSource {
         let kind = error.kind();
         let why = match kind {
             ErrorKind::IsADirectory => format!("{shown} is a directory, not a config"),
-            ErrorKind::InvalidData => format!("{shown} is not UTF-8 text, so no config"),
+            ErrorKind::InvalidData => format!("{shown} is not UTF-8 text, so it is not a config"),
             ErrorKind::FileTooLarge => format!("{shown}: a config {error}"),
             _ => format!("cannot read config {shown}: {error}"),
         };
@@ -260,7 +260,7 @@ mod tests {
         assert!(shown(&folder.path().join("none.toml")).starts_with("cannot read config "));
         let odd = folder.path().join("odd.toml");
         fs::write(&odd, [0xff, 0xfe]).unwrap();
-        assert!(shown(&odd).ends_with("odd.toml is not UTF-8 text, so no config"));
+        assert!(shown(&odd).ends_with("odd.toml is not UTF-8 text, so it is not a config"));
     }
 
     #[test]

@@ -171,7 +171,7 @@ fn tunable(named: Named, value: Value<'_>, leaves: &[Leaf<'_>]) -> Result<Tunabl
     let Some((_, now)) = leaves.iter().find(|(name, _)| *name == key) else {
         let known = leaves.iter().map(|(name, _)| name.as_str());
         let hint = nearest(&key, known).map(|name| format!("; did you mean `{name}`?"));
-        let remedy = "name a single setting that has a default or stands in the config";
+        let remedy = "name a single setting that has a default or is in the config";
         let message =
             format!("nothing to tune is called `{key}`{}; {remedy}", hint.unwrap_or_default());
         return Err(ConfigError::new(message).or_at(Some(place)));

@@ -2,7 +2,7 @@
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Scale {
     Linear,
-    /// Logarithmic scale for values above zero; others are drawn at the low end.
+    /// Logarithmic scale for values above zero; others are drawn at the lower end.
     Log,
 }
 
@@ -27,8 +27,8 @@ impl Axis {
         Self { low, high, from, to, scale }
     }
 
-    /// Creates an axis around the finite values, from zero (linear) or from the round value below
-    /// them (log), to a round value above.
+    /// Creates an axis that contains the finite values, from zero (linear) or from the round value
+    /// below them (log), to a round value above.
     pub fn around(scale: Scale, values: impl IntoIterator<Item = f64>, places: [f64; 2]) -> Self {
         let finite = values.into_iter().filter(|v| v.is_finite());
         match scale {
@@ -73,9 +73,9 @@ impl Axis {
         let step = step_of(self.high - self.low, 5.0);
         let decimals = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
         let first = (self.low / step).ceil();
-        // The addend keeps a tick at the high end in spite of rounding.
+        // The addend keeps a tick at the upper end in spite of rounding.
         let last = (self.high / step + 1e-9).floor();
-        // A bound, so that a step lost to rounding cannot fill the chart with ticks.
+        // The bound keeps a step that is lost to rounding from filling the chart with ticks.
         let count = (last - first).clamp(0.0, 20.0) as u32;
         let values = (0..=count).map(|i| (first + f64::from(i)) * step);
         values.map(|value| (minus(&format!("{value:.decimals$}")), value)).collect()
@@ -88,13 +88,14 @@ impl Axis {
         let times: &[f64] = if self.high / self.low <= 100.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
         let all = (first..=last.min(first + 20))
             .flat_map(|exponent| times.iter().map(move |t| (exponent, t * 10_f64.powi(exponent))));
-        // A margin, so that ticks at the ends are not lost to rounding.
+        // The margin keeps ticks at the ends from being lost to rounding.
         let inside = self.low * 0.999..=self.high * 1.001;
         all.filter(|(_, v)| inside.contains(v)).map(|(e, v)| (rounded(e, v), v)).collect()
     }
 }
 
-/// Returns a round step that divides a range into about `parts`: 1, 2 or 5 times a power of ten.
+/// Returns a round step that divides a range into about `parts` parts: 1, 2 or 5 times a power of
+/// ten.
 fn step_of(range: f64, parts: f64) -> f64 {
     if !(range.is_finite() && range > 0.0) {
         return 1.0;
@@ -111,7 +112,7 @@ const FARTHEST: f64 = 1e12;
 fn drawable([low, high]: [f64; 2]) -> [f64; 2] {
     let low = if low.is_nan() { 0.0 } else { low.clamp(-FARTHEST, FARTHEST) };
     let high = if high.is_nan() { low } else { high.clamp(-FARTHEST, FARTHEST) };
-    // Ends closer than this are the same to the precision of the positions.
+    // Ends closer than this are equal within the precision of the positions.
     let least = (low.abs() * 1e-6).max(1e-9);
     if high - low >= least { [low, high] } else { [low, low + least.max(1.0)] }
 }

@@ -20,11 +20,11 @@ const SIZE: (f64, f64) = (480.0, 300.0);
 const PLOT: Plot = Plot { left: 58.0, right: 468.0, top: 12.0, bottom: 250.0 };
 
 /// False positives per image below which a curve is drawn at the edge: few logs are long enough to
-/// measure less.
+/// measure lower values.
 const LEAST_FPPI: f64 = 1e-3;
 
-/// Renders miss rate over false positives per image, one line per pipeline. The band is the range
-/// in which the log-average miss rate reads the curve.
+/// Renders miss rate against false positives per image, one line per pipeline. The band is the
+/// range in which the log-average miss rate reads the curve.
 pub fn miss_rate(curves: &[Curve<'_>], words: &Words<'_>) -> Markup {
     let reference = [REFERENCE_FPPI[0], REFERENCE_FPPI[8]];
     let most = curves.iter().flat_map(|c| c.points).map(|p| p.fppi).filter(|v| v.is_finite());
@@ -54,8 +54,8 @@ fn line(curve: &Curve<'_>, x: &Axis, y: &Axis) -> Markup {
     }
 }
 
-/// Returns the steps of a curve: the miss rate stays until a lower score adds the next false
-/// positive. Steps below the size of a dot are left out.
+/// Returns the steps of a curve: the miss rate is constant until a lower score adds the next false
+/// positive. Steps smaller than a dot are left out.
 fn steps(curve: &[CurvePoint], x: &Axis, y: &Axis) -> Vec<(f64, f64)> {
     let mut sorted: Vec<&CurvePoint> = curve.iter().collect();
     sorted.sort_by(|a, b| a.fppi.total_cmp(&b.fppi).then(b.miss_rate.total_cmp(&a.miss_rate)));

@@ -4,11 +4,11 @@ use super::{Axis, Scale, px};
 
 const WIDTH: f64 = 120.0;
 
-/// Width of the picture of an interval, which stands beside its value.
+/// Width of the picture of an interval beside its value.
 const INTERVAL_WIDTH: f64 = 48.0;
 
-/// Renders a bar from zero for a cell of a table; `whisker` is a second, greater value. The numbers
-/// stand beside it, so it is hidden from screen readers.
+/// Renders a bar from zero in a cell of a table; `whisker` is a second, larger value. It is hidden
+/// from screen readers, because the numbers stand beside it.
 pub fn bar(value: f64, whisker: Option<f64>, most: f64) -> Markup {
     let axis = Axis::new(Scale::Linear, [0.0, most], [1.0, WIDTH - 1.0]);
     let Some(end) = axis.at(value) else { return html! {} };
@@ -17,7 +17,7 @@ pub fn bar(value: f64, whisker: Option<f64>, most: f64) -> Markup {
         svg class="inline" viewBox="0 0 120 14" width="120" height="14" aria-hidden="true" {
             rect class="bar" x="1" y="2" height="10" width=(px((end - 1.0).max(0.0))) {}
             @if let Some(far) = far {
-                // A whisker below the bar's end would otherwise have a negative length.
+                // A whisker below the end of the bar would have a negative length.
                 line class="whisker" x1=(px(end.min(far))) x2=(px(far)) y1="7" y2="7" {}
                 line class="whisker" x1=(px(far)) x2=(px(far)) y1="2" y2="12" {}
             }
@@ -25,7 +25,7 @@ pub fn bar(value: f64, whisker: Option<f64>, most: f64) -> Markup {
     }
 }
 
-/// Renders an estimate and its interval for a cell of a table, within the range of all.
+/// Renders an estimate and its interval in a cell of a table, within the range of all.
 pub fn interval(estimate: f64, ends: Option<[f64; 2]>, range: [f64; 2]) -> Markup {
     let axis = Axis::new(Scale::Linear, range, [6.0, INTERVAL_WIDTH - 6.0]);
     let Some(at) = axis.at(estimate) else { return html! {} };

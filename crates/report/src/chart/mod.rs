@@ -1,8 +1,8 @@
-//! Charts as SVG: scales, marks and the frame around them.
+//! Charts as SVG: scales, marks and the surrounding frame.
 //!
 //! Every chart is a function from numbers to markup. Colours are classes, so that the style sheet
-//! defines them for light, dark and paper. Series differ by the shape of their marks and by dashes
-//! too, never by colour alone.
+//! defines them for light mode, dark mode and print. Series also differ by the shape of their marks
+//! and by dashes, never by colour alone.
 
 mod axis;
 mod curves;
@@ -26,10 +26,10 @@ pub fn series_class(index: usize) -> String {
     format!("s{}", index % SERIES)
 }
 
-/// Colours of tracks, which are others than those of pipelines.
+/// Number of colours of tracks, which differ from those of pipelines.
 const TRACK_COLOURS: i64 = 20;
 
-/// Returns the class that colours a track, as pictures and pages of runs colour it.
+/// Returns the class that colours a track, the same as in pictures and pages of runs.
 pub fn track_class(id: i64) -> String {
     format!("t{}", id.rem_euclid(TRACK_COLOURS))
 }
@@ -91,7 +91,7 @@ pub fn key(index: usize, name: &str) -> Markup {
 pub struct Words<'a> {
     /// Name of the chart.
     pub title: &'a str,
-    /// Content of the chart, in a sentence.
+    /// Content of the chart, as a sentence.
     pub says: &'a str,
 }
 

@@ -16,13 +16,13 @@ const PLOT: Plot = Plot { left: 56.0, right: 370.0, top: 16.0, bottom: 330.0 };
 /// Duration of a gap after which a line is interrupted, in seconds.
 const PAUSE_S: f64 = 1.0;
 
-/// Distance on the picture below which positions are drawn once.
+/// Distance in the picture below which positions are drawn only once.
 const NEAR: f64 = 1.5;
 
-/// Width and height of a digit of an ID with the room around it, on the picture.
+/// Width and height of a digit of an ID with its margin, in the picture.
 const DIGIT: [f64; 2] = [8.0, 12.0];
 
-/// Lower edges of an ID from the end of its track, first choice first, on the picture.
+/// Lower edges of an ID relative to the end of its track, first choice first, in the picture.
 const ROWS: [f64; 4] = [-5.0, 13.0, -17.0, 25.0];
 
 impl Extent {
@@ -46,14 +46,14 @@ impl Extent {
     }
 }
 
-/// Returns false for positions that are not finite or far beyond any floor; they would hide all
-/// others.
+/// Returns false for positions that are not finite or far beyond any floor, which would shrink all
+/// others to a dot.
 fn drawable(point: &[f64; 3]) -> bool {
     point.iter().all(|v| v.is_finite()) && point[1].abs().max(point[2].abs()) < 1e5
 }
 
-/// Renders a plan view: x (ahead) runs up, y (left) runs left, both at one scale. People are wide
-/// pale lines, tracks are thin ones with their number at the end.
+/// Renders a plan view: x (forward) runs up, y (left) runs left, both at the same scale. People are
+/// wide pale lines, tracks are thin ones with their ID at the end.
 pub fn plan(
     truth: &[Trajectory],
     tracks: &[Trajectory],
@@ -77,7 +77,7 @@ pub fn plan(
                 (hint(&format!("person {}", person.id)))
             }
         }
-        // After the people, so that the thin lines lie on the wide ones.
+        // Drawn after the people, so that the thin lines lie on the wide ones.
         @for (index, (track, lines, label)) in drawn.iter().enumerate() {
             @if let Some(label) = label { (track_lines(index, track, lines, label)) }
         }
@@ -92,27 +92,27 @@ fn truth_line(line: &[(f64, f64)]) -> Markup {
     }
 }
 
-/// Returns the end of a track on the picture.
+/// Returns the end of a track in the picture.
 fn last_of(lines: &[Vec<(f64, f64)>]) -> Option<(f64, f64)> {
     lines.last()?.last().copied()
 }
 
-/// Place of the ID beside the end of its track.
+/// Position of the ID beside the end of its track.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Label {
     /// End of the track.
     end: (f64, f64),
-    /// Left end of the text with its room.
+    /// Left end of the text with its margin.
     left: f64,
     /// Lower edge of the text.
     base: f64,
-    /// Width of the text with its room.
+    /// Width of the text with its margin.
     width: f64,
 }
 
 impl Label {
-    /// Returns the first place around the end that no other ID has, so that two of them are not read
-    /// as one number; it is on the right and above, and near the right border on the left.
+    /// Returns the first position around the end that no other ID has, so that two IDs are not read
+    /// as one number: on the right and above if possible, and on the left near the right border.
     fn free(end: (f64, f64), id: i64, taken: &mut Vec<Self>) -> Self {
         let width = DIGIT[0] * id.to_string().len() as f64;
         let right = 7.0;
@@ -142,7 +142,7 @@ fn track_lines(
     lines: &[Vec<(f64, f64)>],
     label: &Label,
 ) -> Markup {
-    // The text itself is narrower than its room: it begins or ends beside the mark.
+    // The text itself is narrower than its box: it begins or ends beside the mark.
     let is_left = label.left < label.end.0;
     let (x, anchor) =
         if is_left { (label.left + label.width, "end") } else { (label.left, "start") };
@@ -159,7 +159,7 @@ fn track_lines(
     }
 }
 
-/// Returns the lines of a trajectory between its gaps, as positions on the picture.
+/// Returns the parts of a trajectory between its gaps, as positions in the picture.
 fn lines(trajectory: &Trajectory, left: &Axis, ahead: &Axis) -> Vec<Vec<(f64, f64)>> {
     let mut lines: Vec<Vec<(f64, f64)>> = Vec::new();
     let mut before_s = f64::NEG_INFINITY;

@@ -9,16 +9,17 @@ pub struct Mark<'a> {
     pub name: &'a str,
     /// Index among the pipelines, for colour and shape.
     pub series: usize,
-    /// Time per frame, ms; less is better.
+    /// Time per frame, ms; lower is better.
     pub ms: f64,
-    /// Accuracy; more is better.
+    /// Accuracy; higher is better.
     pub accuracy: f64,
 }
 
 const SIZE: (f64, f64) = (760.0, 360.0);
 const PLOT: Plot = Plot { left: 62.0, right: 740.0, top: 14.0, bottom: 308.0 };
 
-/// Renders accuracy over time, and the line of the pipelines that no other beats in both.
+/// Renders accuracy against time, with a line through the pipelines that no other beats in both
+/// (the Pareto front).
 pub fn front(marks: &[Mark<'_>], accuracy_name: &str, words: &Words<'_>) -> Markup {
     let x = Axis::around(Scale::Log, marks.iter().map(|m| m.ms), [PLOT.left, PLOT.right]);
     let accuracies = marks.iter().map(|m| m.accuracy);
@@ -51,7 +52,7 @@ fn labels(marks: &[(&str, (f64, f64))]) -> Vec<(f64, f64, &'static str)> {
         marks.iter().map(|&(_, (x, y))| [x - 7.0, y - 7.0, x + 7.0, y + 7.0]).collect();
     let mut placed = Vec::new();
     for &(name, (x, y)) in marks {
-        // In the order of preference: beside a mark a name is read with it at once.
+        // In order of preference: a name beside its mark is the easiest to assign.
         let sides = [
             (x + 11.0, y + 4.0, "start"),
             (x - 11.0, y + 4.0, "end"),
@@ -75,7 +76,7 @@ fn labels(marks: &[(&str, (f64, f64))]) -> Vec<(f64, f64, &'static str)> {
 
 /// Returns the approximate rectangle of a name.
 fn label_box(name: &str, (x, y, anchor): (f64, f64, &str)) -> Box4 {
-    // About seven units a character, because the width is known to the browser only.
+    // About seven units per character, because only the browser knows the width.
     let width = 7.0 * name.chars().count() as f64;
     let left = match anchor {
         "end" => x - width,
@@ -89,11 +90,11 @@ fn overlap(a: &Box4, b: &Box4) -> bool {
     a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]
 }
 
-/// Returns the marks that no other beats in both, fastest first.
+/// Returns the marks that no other beats in both time and accuracy, fastest first.
 fn unbeaten<'a, 'b>(marks: &'b [Mark<'a>]) -> Vec<&'b Mark<'a>> {
     let mut sorted: Vec<&Mark<'_>> =
         marks.iter().filter(|m| m.ms.is_finite() && m.accuracy.is_finite()).collect();
-    // Of equal times the most accurate first, so that the others do not pass the test.
+    // Of equal times the most accurate comes first, so that the others fail the test.
     sorted.sort_by(|a, b| a.ms.total_cmp(&b.ms).then(b.accuracy.total_cmp(&a.accuracy)));
     let mut best = f64::NEG_INFINITY;
     sorted.retain(|m| {
@@ -105,7 +106,7 @@ fn unbeaten<'a, 'b>(marks: &'b [Mark<'a>]) -> Vec<&'b Mark<'a>> {
     sorted
 }
 
-/// Returns the best accuracy for each time as steps: it stays level until the next mark.
+/// Returns the best accuracy for each time as steps: it is constant until the next mark.
 fn stairs(front: &[&Mark<'_>], place: impl Fn(&Mark<'_>) -> Option<(f64, f64)>) -> Vec<(f64, f64)> {
     let mut line: Vec<(f64, f64)> = Vec::new();
     for at in front.iter().filter_map(|m| place(m)) {

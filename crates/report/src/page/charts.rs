@@ -8,10 +8,11 @@ use crate::chart::{Curve, Extent, Words, bar, key, miss_rate, plan, series_class
 use crate::figures::FEW_SCORES;
 use crate::model::TaskResult;
 
-/// Most plans that are open, by whole logs with a truth: with more the page would be long.
+/// Maximum number of plans that are unfolded, in whole logs with a truth; more would make the page
+/// too long.
 const OPEN_PLANS: usize = 4;
 
-/// Most charts of miss rates that are not folded.
+/// Maximum number of miss-rate charts that are not folded.
 const OPEN_CHARTS: usize = 4;
 
 impl Page<'_> {
@@ -20,8 +21,8 @@ impl Page<'_> {
             self.view.logs.iter().filter_map(|log| self.miss_rate(log)).collect();
         (!charts.is_empty()).then(|| html! {
             p {
-                "People missed against false reports, as the least score that is accepted falls. Lower is better. "
-                "LAMR is the geometric mean of the curve at nine places in the shaded band."
+                "Miss rate against false positives per image while the score threshold falls. Lower is better. "
+                "LAMR is the geometric mean of the curve at nine points in the shaded band."
                 " A pipeline with fewer than " (FEW_SCORES) " different scores on a log has no line there."
                 (self.of_the_best())
             }
@@ -60,13 +61,13 @@ impl Page<'_> {
         })
     }
 
-    /// Returns the tasks of a log that stand for their pipelines.
+    /// Returns the tasks of a log that represent their pipelines.
     fn drawn(&self, log: &str) -> impl Iterator<Item = &TaskResult> {
         let best = self.view.pipelines.iter().take(MOST_DRAWN);
         best.filter_map(move |p| self.view.drawn(p, log))
     }
 
-    /// Says that a chart has the best pipelines only, if it does.
+    /// Returns a remark that a chart shows only the best pipelines, if it does.
     fn of_the_best(&self) -> Markup {
         html! {
             @if self.view.pipelines.len() > MOST_DRAWN { " The " (MOST_DRAWN) " best pipelines are shown." }
@@ -95,7 +96,7 @@ impl Page<'_> {
 
     fn plans_of(&self, log: &str, is_open: bool) -> Option<Markup> {
         let tasks: Vec<&TaskResult> = self.drawn(log).collect();
-        // One extent for all pipelines, so that their plans can be compared at sight.
+        // One extent for all pipelines, so that their plans can be compared at a glance.
         let extent = Extent::around(tasks.iter().flat_map(|t| t.truth.iter().chain(&t.tracks)))?;
         Some(html! {
             details class="print" open[is_open] {
@@ -109,7 +110,7 @@ impl Page<'_> {
         let tables: Vec<Markup> =
             self.view.pipelines.iter().filter_map(|p| self.funnel(p)).collect();
         (!tables.is_empty()).then(|| html! {
-            p { "Each test in its order and how many candidates it dropped, over all logs. When somebody is never found, look here first." }
+            p { "The tests in their order, and how many candidates each one dropped, over all logs. If a person is never found, look here first." }
             details class="print" { summary { "Tests of each pipeline" } div class="funnels" { @for table in &tables { (table) } } }
         })
     }
@@ -125,7 +126,7 @@ impl Page<'_> {
             *counts.entry(&dropped.test).or_default() += dropped.count;
         }
         let most = *counts.values().max()? as f64;
-        // At least 1, because no candidate may have been dropped.
+        // At least 1, because it may be that no candidate was dropped.
         let all = counts.values().sum::<u64>().max(1) as f64;
         let head = html! { (column("Test", None)) (column("Dropped", None)) (column("Share", None)) th scope="col" class="picture" { "Dropped, as a bar" } };
         let body = html! {

@@ -8,10 +8,10 @@ use crate::chart::key;
 use crate::model::{EventRow, TaskResult};
 use crate::view::OrderedBenchmark;
 
-/// Most rows of events on the page.
+/// Maximum number of rows of events on the page.
 const MOST_ROWS: usize = 3000;
 
-/// Most pictures of events on the page, bytes of base64.
+/// Maximum size of the pictures of events on the page, bytes of base64.
 const MOST_PICTURES: usize = 800_000;
 
 /// Tasks whose events the page lists and shows, by their indices.
@@ -22,7 +22,7 @@ pub(super) struct Listed {
 }
 
 impl Listed {
-    /// Chooses tasks of the best pipelines first, as many as the page has room for.
+    /// Chooses as many tasks as the page has room for, those of the best pipelines first.
     pub(super) fn of(view: &OrderedBenchmark<'_>) -> Self {
         let mut listed = Self::default();
         let mut rows = 0;
@@ -57,7 +57,7 @@ impl Page<'_> {
     pub(super) fn events(&self) -> Option<Markup> {
         let tasks: Vec<&TaskResult> =
             self.view.tasks.iter().copied().filter(|t| !t.events.is_empty()).collect();
-        // Numbered among all tasks, as the links from the pairs are.
+        // The index is that among all tasks, as in the links from the pairs.
         let numbered = self.view.tasks.iter().enumerate();
         let numbered = numbered.filter(|(number, _)| self.listed.has_rows(*number));
         let more = tasks.len() - numbered.clone().count();
@@ -114,7 +114,7 @@ impl Page<'_> {
                 }
             }
         };
-        let caption = html! { "Events by kind and pipeline, over all tasks. A miss is a time without a reported track, however many frames it lasts." };
+        let caption = html! { "Events by kind and pipeline, over all tasks. A miss is one period without a reported track, of any number of frames." };
         let name = "Events by kind";
         html! {
             details class="print" open[self.view.pipelines.len() <= MOST_UNFOLDED] {
@@ -133,7 +133,8 @@ impl Page<'_> {
         let mut events: Vec<(usize, &EventRow)> = task.events.iter().enumerate().collect();
         events.sort_by(|a, b| a.1.t_s.total_cmp(&b.1.t_s));
         let body = html! { @for (index, event) in events { (row(event, &event_id(number, index), self.listed.pictures.contains(&number))) } };
-        let caption = html! { "In time; a time is counted from the first frame of the log." };
+        let caption =
+            html! { "In order of time, which is counted from the first frame of the log." };
         html! {
             details class="events" {
                 summary {
@@ -164,7 +165,7 @@ fn row(event: &EventRow, id: &str, is_shown: bool) -> Markup {
     }
 }
 
-/// Renders a kind of event with a sign of its own, because colour alone is not enough.
+/// Renders a kind of event with its own sign, because colour alone is not enough.
 pub(super) fn kind(kind: &str) -> Markup {
     let (sign, name) = match kind {
         "miss" => ("○", "miss"),
@@ -178,9 +179,9 @@ pub(super) fn kind(kind: &str) -> Markup {
     html! { span class=(class) { span aria-hidden="true" { (sign) " " } (name) } }
 }
 
-/// Renders the picture of an event; text other than base64 is left out.
+/// Renders the picture of an event; data that is not base64 is left out.
 pub(super) fn picture(event: &EventRow) -> Markup {
-    // Other text is no picture, and the page would show a broken one.
+    // Other data is no picture, and the page would show a broken one.
     let data = event.picture_png_base64.as_deref().filter(|data| is_base64(data));
     html! {
         @if let Some(data) = data {

@@ -9,25 +9,25 @@ use crate::figures::{ComparisonSpace, Figure};
 impl Page<'_> {
     pub(super) fn explain(&self) -> Markup {
         html! {
-            details class="print" { summary { "Each figure in a sentence" } dl { (figures()) } }
+            details class="print" { summary { "The figures, each in one sentence" } dl { (figures()) } }
             div class="columns" {
                 div {
                     h3 { "What the intervals mean" }
                     p {
-                        "A figure is formed per log, over the seeds first, and then averaged over logs: each log counts once, however long it is. "
-                        "Its 95 % interval is Student's, over logs, not frames, because frames of one recording resemble each other. "
-                        "A mean of one log has none, and neither has one of logs that all show the same value: they do not tell how much others "
-                        "differ. Two kinds of intervals say next to nothing and are in report.json alone: those of two logs, and, of figures between "
-                        "two fixed ends, as HOTA from 0 to 1, those that leave out less than a twentieth of the values at each end. "
-                        "No interval knows places of a kind that no log shows. Differences between two pipelines are formed in pairs, log by log. "
-                        "Rates of people found have Wilson intervals, widened by what the logs differ in."
+                        "A figure is computed for each log, as the mean over the seeds, and then averaged over logs: each log counts once, regardless of its length. "
+                        "Its 95 % interval is Student's, over logs rather than frames, because frames of one recording resemble each other. "
+                        "A mean of one log has none, and neither has a mean of equal values: they do not show how much other logs "
+                        "differ. Two kinds of intervals say next to nothing and are in report.json only: those of two logs, and, for figures between "
+                        "two fixed ends, such as HOTA from 0 to 1, those that leave out less than a twentieth of the range at each end. "
+                        "No interval covers kinds of places that no log shows. Differences between two pipelines are computed in pairs, log by log. "
+                        "Rates of people found have Wilson intervals, widened by the differences between logs."
                     }
                 }
                 div {
                     h3 { "What is left out" }
                     p {
-                        "People and boxes marked as ignored in the truth count neither for nor against a pipeline. Failed and skipped tasks enter no mean. "
-                        "On a log without people only false reports have a meaning; the other figures are absent there."
+                        "People and boxes marked as ignored in the truth count neither for nor against a pipeline. Failed and skipped tasks are in no mean. "
+                        "On a log without people only false positives have a meaning; the other figures are absent there."
                     }
                 }
                 div {
@@ -47,12 +47,12 @@ fn figures() -> Markup {
     let all = ComparisonSpace::ALL
         .into_iter()
         .flat_map(Figure::at)
-        // Figures of both spaces are explained once.
+        // Figures that occur in both spaces are explained once.
         .filter(|f| known.insert(f.name))
         .collect::<Vec<_>>();
     html! {
         dt { "Done" }
-        dd { "Tasks that ran to their end, of those planned." }
+        dd { "Tasks that were completed, of those planned." }
         dt { "People found" }
         dd { "People of the truth with a track on them in at least one frame, of all people." }
         @for figure in all {
@@ -61,8 +61,7 @@ fn figures() -> Markup {
         }
         dt { "NIS" }
         dd {
-            "Squares of a filter's surprises over their own variance. Above its bounds the filter is too sure of itself, "
-            "below them too timid."
+            "Normalised innovation squared of the filter. Above its bounds the filter is overconfident, below them underconfident."
         }
     }
 }

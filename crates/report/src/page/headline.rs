@@ -39,7 +39,8 @@ impl Page<'_> {
         self.view.tasks.iter().any(|task| place.scores(task).is_some())
     }
 
-    /// Names the pipeline with the best main figure, and says if the difference is significant.
+    /// Names the pipeline with the best main figure, and states whether the difference is
+    /// significant.
     fn verdict(&self) -> Option<Markup> {
         let place = ComparisonSpace::ALL.into_iter().find(|p| self.ranked(*p).len() > 1)?;
         let ranked = self.ranked(place);
@@ -73,7 +74,7 @@ impl Page<'_> {
         })
     }
 
-    /// Says that a pair has fewer logs in common than any clear difference takes, if so.
+    /// Returns a remark that a pair has too few common logs for a significant difference, if so.
     fn too_few_logs(&self, pair: &PairSummary) -> Option<String> {
         let pairs = self.summary.pairs_by(&pair.figure);
         let needed = draws_needed(pairs);
@@ -105,8 +106,8 @@ impl Page<'_> {
         let most_logs = self.summary.pipelines.iter().map(|p| logs_of(p, place)).max().unwrap_or(0);
         let head = html! {
             (column("Pipeline", None))
-            (column("Done", Some("Tasks that ran to their end, of those planned")))
-            @if place == ComparisonSpace::Image { (column("People found", Some("Found at all, with 95 % interval"))) }
+            (column("Done", Some("Tasks that were completed, of those planned")))
+            @if place == ComparisonSpace::Image { (column("People found", Some("People found in at least one frame, with 95 % interval"))) }
             @for figure in &figures { (figure_head(figure)) }
         };
         let body = html! {
@@ -143,9 +144,9 @@ impl Page<'_> {
         let Some(estimate) = summary.figures.get(&key) else { return no_cell() };
         let all: Vec<&Estimate> =
             self.summary.pipelines.iter().filter_map(|p| p.figures.get(&key)).collect();
-        // That a pipeline has fewer logs than others stands in the column "Done", once for all figures.
+        // The column "Done" shows that a pipeline has fewer logs than others, once for all figures.
         let is_of_fewer = estimate.logs < logs_of(summary, place);
-        // One picture per row is enough: that of the ranking figure.
+        // One picture per row is enough, for the figure that ranks the pipelines.
         let picture = (figure.name == MAIN.name)
             .then(|| interval(estimate.mean, shown_interval(estimate), range(&all)));
         cell(
@@ -196,7 +197,7 @@ impl Page<'_> {
 
 fn log_cell(value: Option<f64>, best: f64, columns: usize) -> Markup {
     let Some(value) = value else { return no_cell() };
-    // A single column has no best one, and a pipeline without a match is the best in nothing.
+    // In a single column nothing is best, and a pipeline without a match is never best.
     let best = columns > 1 && value > 0.0 && !MAIN.better_as_printed(best, value);
     cell(value, &starred(value, MAIN.decimals, best))
 }
@@ -239,7 +240,7 @@ pub(super) fn figure_name(figure: &Figure) -> String {
     if figure.unit.is_empty() { name.to_owned() } else { format!("{name} [{}]", figure.unit) }
 }
 
-/// Number of logs of the main figure.
+/// Returns the number of logs of the main figure.
 fn logs_of(summary: &PipelineSummary, place: ComparisonSpace) -> u64 {
     summary.figures.get(&MAIN.key(place)).map_or(0, |estimate| estimate.logs)
 }
@@ -267,14 +268,14 @@ fn people_cell(summary: &PipelineSummary) -> Markup {
     )
 }
 
-/// Range of a share.
+/// Range of a fraction.
 const SHARE: [f64; 2] = [0.0, 1.0];
-/// Least part of the range of a figure that an interval leaves out at one end to be worth its place in
-/// a cell.
+/// Minimum part of the range of a figure that an interval must exclude at one end to be worth
+/// showing in a cell.
 const LEAST_INFORMATION: f64 = 0.05;
 
-/// Least number of logs of which the interval of a mean is shown: that of two logs is 25 times as wide as
-/// its standard error, and hides the figures beside it.
+/// Minimum number of logs for which the interval of a mean is shown: that of two logs is 25 times
+/// as wide as its standard error, and hides the figures beside it.
 const LEAST_LOGS: u64 = 3;
 
 /// Returns the interval of a mean over enough logs.
@@ -282,8 +283,8 @@ fn shown_interval(estimate: &Estimate) -> Option<[f64; 2]> {
     estimate.interval.filter(|_| estimate.logs >= LEAST_LOGS)
 }
 
-/// Returns false for an interval that covers nearly all values that a figure of this range can have.
-/// One of a range without an end, as of a count, always leaves out some.
+/// Returns false for an interval that covers nearly all possible values of the figure. If the range
+/// has no end, as for a count, it always excludes some.
 fn informs(ends: &[f64; 2], [least, most]: [f64; 2]) -> bool {
     let least_part = LEAST_INFORMATION * (most - least);
     !least_part.is_finite() || ends[0] > least + least_part || ends[1] < most - least_part
@@ -298,13 +299,13 @@ pub(super) fn ends_of([low, high]: [f64; 2], decimals: usize) -> Markup {
     html! { span class="ends" { (span_of([low, high], decimals)) } }
 }
 
-/// Formats two ends as one text; with a negative one a dash would look like a sign.
+/// Formats two ends as one text; a dash beside a negative number would look like a sign.
 pub(super) fn span_of([low, high]: [f64; 2], decimals: usize) -> String {
     let between = if low < 0.0 || high < 0.0 { " to " } else { "–" };
     format!("{}{between}{}", number(low, decimals), number(high, decimals))
 }
 
-/// Returns both p-values of a pair where they differ, as the table of pairs has both.
+/// Returns both p-values of a pair if they differ, as in the table of pairs.
 fn p_of(pair: &PairSummary) -> String {
     let [alone, corrected] = [pair.p_value, pair.p_corrected].map(p_equals);
     if alone == corrected {
@@ -319,7 +320,7 @@ fn p_equals(p: f64) -> String {
     if text.starts_with('<') { text } else { format!("= {text}") }
 }
 
-/// Returns the range from the lowest to the highest end of all, including zero.
+/// Returns the range from the lowest to the highest end of all intervals, including zero.
 fn range(all: &[&Estimate]) -> [f64; 2] {
     let ends = all
         .iter()

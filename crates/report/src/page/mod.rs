@@ -18,7 +18,7 @@ use crate::model::{Benchmark, Moment, Timings};
 use crate::summary::{PipelineSummary, Summary};
 use crate::view::OrderedBenchmark;
 
-/// Style that all pages have in common: colours as CSS variables, for light and dark, letters, tables.
+/// Style that all pages share: colours as CSS variables for light and dark mode, fonts, tables.
 pub const BASE_STYLE: &str = include_str!("base.css");
 
 // Inlined, so that the page is one file.
@@ -27,16 +27,16 @@ const SCRIPT: &str = include_str!("page.js");
 
 const TITLE: &str = "Tagalong benchmark";
 
-/// Most pipelines that are told apart in one chart or image; of more the best ones are shown.
+/// Maximum number of pipelines in one chart or image; if there are more, the best ones are shown.
 const MOST_DRAWN: usize = 8;
 
-/// Anchors of the sections that are a sentence and a folded list; two stand beside each other.
+/// Anchors of the sections that consist of a sentence and a folded list; two of them share a row.
 const SHORT: [&str; 5] = ["failed", "repairs", "funnel", "tasks", "inputs"];
 
-/// Most entries of a list that are not folded together.
+/// Maximum number of entries of a list that is not folded.
 const MOST_UNFOLDED: usize = 6;
 
-/// Data that the sections are made from.
+/// Data from which the sections are made.
 struct Page<'a> {
     view: OrderedBenchmark<'a>,
     summary: Summary,
@@ -50,7 +50,7 @@ struct Page<'a> {
     timings_left_out: bool,
 }
 
-/// Returns a page with a link to its element `main` for the keyboard, which has the text `skip`.
+/// Returns a page that has a link to its element `main` for keyboard users, with the text `skip`.
 pub fn document(title: &str, style: &Markup, skip: &str, body: &Markup) -> Markup {
     html! {
         (DOCTYPE)
@@ -94,7 +94,7 @@ struct Section {
     anchor: &'static str,
     heading: &'static str,
     body: Markup,
-    /// True for a sentence and a list that is folded, which needs half of the width.
+    /// True for a sentence with a folded list, which needs half of the width.
     is_short: bool,
 }
 
@@ -125,7 +125,7 @@ impl Page<'_> {
     }
 
     fn sections(&self) -> Vec<Section> {
-        // The plot comes first if there is one; the remark that there is none does not.
+        // The plot comes first if there is one; a remark that there is none comes later.
         let (first, later) = match self.timings {
             Some(_) => (Some(self.speed()), None),
             None => (None, Some(self.speed())),
@@ -178,7 +178,7 @@ impl Page<'_> {
         }
     }
 
-    /// Returns the pipelines that some log suits, each with its rank.
+    /// Returns the pipelines that were run on at least one log, each with its rank.
     fn tried(&self) -> impl Iterator<Item = (usize, &str)> + Clone {
         let ranked = self.view.pipelines.iter().copied().enumerate();
         ranked.filter(|(_, name)| self.summary.pipeline(name).is_none_or(|p| !was_skipped(p)))
@@ -200,7 +200,7 @@ fn number(value: f64, decimals: usize) -> String {
     if value.is_finite() { minus(&format!("{value:.decimals$}")) } else { "–".to_owned() }
 }
 
-/// Formats a difference, always with its sign.
+/// Formats a difference, always with a sign.
 fn signed(value: f64, decimals: usize) -> String {
     let text = number(value, decimals);
     // A difference that rounds to zero has no sign.
@@ -211,7 +211,7 @@ fn signed(value: f64, decimals: usize) -> String {
     }
 }
 
-/// Renders a heading cell by which the table can be sorted.
+/// Renders a column heading by which the table can be sorted.
 fn column(name: &str, hint: Option<&str>) -> Markup {
     html! { th scope="col" title=[hint] { (name) } }
 }

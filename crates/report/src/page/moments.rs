@@ -9,13 +9,13 @@ use crate::chart::{key, px, series_class};
 use crate::model::{MissedPerson, Moment, TaskResult};
 use crate::view::OrderedBenchmark;
 
-/// Most images of the page together, bytes of base64.
+/// Maximum size of all images of the page together, bytes of base64.
 const MOST_BYTES: usize = 1_800_000;
 
-/// Most moments of the page.
+/// Maximum number of moments on the page.
 const MOST_MOMENTS: usize = 24;
 
-/// Overlap from which a track is on a person, as in the figures.
+/// Overlap from which on a track matches a person, as in the figures.
 const SAME_IOU: f64 = 0.5;
 
 /// Name of the row of people without a recorded candidate.
@@ -24,7 +24,7 @@ pub(super) const NO_CANDIDATE: &str = "no candidate";
 /// Box in pixels: left, top, width, height.
 type Box = [f64; 4];
 
-/// Returns the moments that the page has room for; those that come first matter most.
+/// Returns the moments that the page has room for; the most important come first.
 pub(super) fn shown<'a>(all: &'a [Moment], view: &OrderedBenchmark<'_>) -> Vec<&'a Moment> {
     let mut bytes = 0;
     let usable = all.iter().filter(|m| is_base64(&m.image_jpeg_base64) && m.size[0] > 0);
@@ -46,15 +46,15 @@ impl Page<'_> {
             html! {
                 p {
                     "Each frame in which an annotated person has no reported track, by the test that dropped the candidate "
-                    "at that person: the last such test, which the candidate came nearest to passing. A predicted "
-                    "track is not reported. " em { (NO_CANDIDATE) } ": no detector proposed anything there."
+                    "at that person: the last one that a candidate reached. A predicted "
+                    "track is not reported. " em { (NO_CANDIDATE) } ": no detector proposed a candidate there."
                 }
                 details class="print" { summary { "Missed people by cause" } (self.missed_by_test()) }
                 @if !self.moments.is_empty() {
                     p {
-                        "Moments in the middle of the longest misses: white and dashed the people, in colour the "
+                        "Frames in the middle of the longest misses: the people white and dashed, in colour the "
                         "tracks of each pipeline" @if self.view.pipelines.len() > MOST_DRAWN { " (of the " (MOST_DRAWN) " best)" }
-                        ", thin and dashed the candidates that were dropped."
+                        ", and thin and dashed the dropped candidates."
                     }
                 }
                 (self.moments())
@@ -62,7 +62,7 @@ impl Page<'_> {
         })
     }
 
-    /// Renders the moments; of many, those of each log are folded together.
+    /// Renders the moments; if there are many, those of each log are folded together.
     fn moments(&self) -> Markup {
         if self.moments.len() <= MOST_UNFOLDED {
             return html! { @for moment in &self.moments { (self.moment(moment)) } };
@@ -90,10 +90,10 @@ impl Page<'_> {
             }
         }
         let mut tests: Vec<(&str, BTreeMap<&str, u64>)> = counts.into_iter().collect();
-        // The test that costs most comes first.
+        // The test with the most misses comes first.
         tests.sort_by_key(|(test, of)| (std::cmp::Reverse(of.values().sum::<u64>()), *test));
         let head = html! {
-            (column("Cause", None)) (column("Why", Some("With the settings of the first pipeline that has the cause")))
+            (column("Cause", None)) (column("Why", Some("With the settings of the first pipeline in which the cause occurs")))
             @for (rank, p) in self.tried() { (self.column_of(rank, p)) }
         };
         let body = html! {
@@ -112,7 +112,7 @@ impl Page<'_> {
         table("Missed people by cause", &caption, &head, &body)
     }
 
-    /// Renders the heading of a pipeline: its name, or its rank where many stand beside each other.
+    /// Renders the heading of a pipeline: its name, or its rank if there are many columns.
     pub(super) fn column_of(&self, rank: usize, pipeline: &str) -> Markup {
         if self.view.pipelines.len() <= MOST_DRAWN {
             return column(pipeline, None);
@@ -205,7 +205,7 @@ impl Page<'_> {
     }
 }
 
-/// Whether a pipeline missed a person, and why, or as which track it has the person.
+/// Renders whether a pipeline missed a person and why, or with which track it matched the person.
 fn fate_of(
     moment: &Moment,
     missed: &[(&TaskResult, &MissedPerson)],
@@ -231,7 +231,7 @@ fn outline([x, y, width, height]: &Box, class: &str, stroke: f64) -> Markup {
     }
 }
 
-/// Returns the number of the pipeline's track on a person of the moment.
+/// Returns the ID of the pipeline's track that matches a person at that moment.
 fn track_on(moment: &Moment, pipeline: &str, person: i64) -> Option<i64> {
     let (_, at) = moment.people.iter().find(|(id, _)| *id == person)?;
     let tracks = moment.tracks.get(pipeline)?.iter();

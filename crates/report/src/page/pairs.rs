@@ -12,20 +12,20 @@ use crate::compare::{Difference, SAME_EVENT_S, compare_in};
 use crate::figures::{ComparisonSpace, Figure, MAIN};
 use crate::summary::PairSummary;
 
-/// Most differences listed of all pairs together; the rest is counted.
+/// Maximum number of differences that are listed for all pairs together; the rest is counted.
 const MOST_LISTED: usize = 1200;
 
-/// A kind of error that can be what two pipelines differ in.
+/// A kind of error in which two pipelines can differ.
 struct ErrorKind {
     /// Key of its figure in the summary.
     figure: &'static str,
-    /// Least difference of the means over logs that is named.
+    /// Minimum difference of the means over logs that is mentioned.
     least: f64,
     decimals: usize,
-    /// Words for the pipeline that has more of it, before and after the number.
+    /// Words for the pipeline with more of these errors, before and after the number.
     words: [&'static str; 2],
-    /// True for errors of identity, of which the first one is named: a track that goes over to another
-    /// person costs more than a new ID for the same one.
+    /// True for errors of identity, of which only the first is mentioned: a track that moves to
+    /// another person is worse than a new ID for the same one.
     is_of_identity: bool,
 }
 
@@ -37,7 +37,7 @@ struct Costly<'a> {
     is_test: bool,
 }
 
-/// Errors beside misses, which are named by their tests.
+/// Errors other than misses, which are listed by test.
 const ERROR_KINDS: [ErrorKind; 3] = [
     ErrorKind {
         figure: "image.fp_per_frame",
@@ -62,10 +62,11 @@ const ERROR_KINDS: [ErrorKind; 3] = [
     },
 ];
 
-/// Most pipelines of which each pair is described; of more it is the best one against others.
+/// Maximum number of pipelines for which every pair is described; with more, the best one is
+/// compared with each other one.
 const ALL_PAIRS_OF: usize = 4;
 
-/// Most pairs that are described.
+/// Maximum number of pairs that are described.
 const MOST_PAIRS: usize = 10;
 
 impl Page<'_> {
@@ -85,7 +86,7 @@ impl Page<'_> {
                 @if let Some((pairs, needed)) = self.logs_needed() {
                     ". With " (counted(pairs, "pair")) " that takes " (needed) " logs at least"
                 }
-                ". The interval is Student's, of one pair alone, and no part of that test: it can leave out 0 beside "
+                ". The interval is Student's, for one pair alone, and separate from that test: it can exclude 0 beside "
                 "\"not clear\". The figures are not corrected for each other: choose the one that matters before looking."
             }
             @if self.view.pipelines.len() > 2 { (self.matrix()) }
@@ -99,13 +100,13 @@ impl Page<'_> {
                 }
             }
             @if self.tried().count() > ALL_PAIRS_OF {
-                p { "Described is the best pipeline against the next ones; all pairs are in report.json." }
+                p { "The text compares the best pipeline with the next ones; all pairs are in report.json." }
             }
         })
     }
 
-    /// Returns the number of pairs that are compared by the main figure, and that of the logs without
-    /// which none of them can be clear.
+    /// Returns the number of pairs that are compared by the main figure, and the minimum number of
+    /// logs for a significant difference among them.
     fn logs_needed(&self) -> Option<(usize, usize)> {
         let shown = ComparisonSpace::ALL.into_iter();
         let mut counts = shown.map(|place| self.summary.pairs_by(&MAIN.key(place)));
@@ -113,8 +114,8 @@ impl Page<'_> {
         Some((pairs, draws_needed(pairs)))
     }
 
-    /// Says in one line in what a pair differs: people found, the test that costs the worse one most, and
-    /// other errors.
+    /// Describes in one line how a pair differs: people found, the test that costs the worse one
+    /// most, and other errors.
     pub(super) fn why_of_pair(&self, a: &str, b: &str) -> Option<String> {
         let [mut better, mut worse] = [a, b].map(|name| {
             let found = self.summary.pipeline(name).and_then(|it| it.people_found_count());
@@ -156,7 +157,7 @@ impl Page<'_> {
         Some(line)
     }
 
-    /// Says how often two pipelines make an error, the worse one first, if they differ in that.
+    /// Describes how often two pipelines make an error, the worse one first, if they differ.
     fn errors_of_pair(&self, kind: &ErrorKind, a: &str, b: &str) -> Option<String> {
         let a = (self.mean_of(kind.figure, a)?, a);
         let b = (self.mean_of(kind.figure, b)?, b);
@@ -172,7 +173,8 @@ impl Page<'_> {
         Some(self.summary.pipeline(pipeline)?.figures.get(figure)?.mean)
     }
 
-    /// Returns the missed people in frames of a pipeline by cause, over the runs that are drawn.
+    /// Returns a pipeline's number of missed people by cause, summed over frames, in the runs that
+    /// are shown.
     fn misses_by_test(&self, pipeline: &str) -> BTreeMap<Costly<'_>, u64> {
         let mut counts = BTreeMap::new();
         for task in self.view.logs.iter().filter_map(|log| self.view.drawn(pipeline, log)) {
@@ -185,17 +187,17 @@ impl Page<'_> {
         counts
     }
 
-    /// Returns the pairs that are described, each in the order of the names.
+    /// Returns the pairs that are described, ordered by name.
     fn described_pairs(&self) -> Vec<(&str, &str)> {
         let names: Vec<&str> = self.tried().map(|(_, name)| name).collect();
         let names = &names;
-        // Of many pipelines only the first one is compared with each other one.
+        // With many pipelines only the first one is compared with each other one.
         let firsts = if names.len() > ALL_PAIRS_OF { 1 } else { names.len() };
         let pairs = (0..firsts).flat_map(|i| names[i + 1..].iter().map(move |b| (names[i], *b)));
         pairs.map(|(a, b)| (a.min(b), a.max(b))).take(MOST_PAIRS).collect()
     }
 
-    /// Renders what each pipeline gains on each other one in the main figure.
+    /// Renders the gain of each pipeline over each other one in the main figure.
     fn matrix(&self) -> Markup {
         let shown = ComparisonSpace::ALL.into_iter();
         let place = shown
@@ -216,7 +218,7 @@ impl Page<'_> {
             }
         };
         let caption = html! {
-            (MAIN.name) " " (place_where(place)) ": the pipeline of the row less that of the column, over the logs in common, "
+            (MAIN.name) " " (place_where(place)) ": the pipeline of the row minus that of the column, over the logs in common, "
             "best pipeline first. Bold with an arrow: clear."
         };
         let name = "Each pipeline against each other";
@@ -234,7 +236,7 @@ impl Page<'_> {
         let figure = MAIN.key(place);
         let pair = self.summary.pairs.iter().find(|p| p.a == a && p.b == b && p.figure == figure);
         let Some(pair) = pair.filter(|_| row != other) else { return no_cell() };
-        // A pair holds the difference of `b` from `a`.
+        // A pair holds the difference `b - a`.
         let gain = if row == b { pair.difference } else { -pair.difference };
         let shown = signed(gain, MAIN.decimals);
         cell(
@@ -251,7 +253,7 @@ impl Page<'_> {
         )
     }
 
-    /// Renders some of `count` pairs beside each other.
+    /// Renders some of `count` pairs side by side.
     fn pairs_of(&self, pairs: &[(&str, &str)], count: usize) -> Markup {
         html! { div class="folds wide" { @for (a, b) in pairs { (self.pair(a, b, MOST_LISTED / count)) } } }
     }
@@ -302,7 +304,7 @@ impl Page<'_> {
             }
         };
         let caption = html! {
-            "Events that happened to one of them only, in time. Events of one kind and person within "
+            "Events that happened to one of them only, in order of time. Events of one kind and person within "
             (number(SAME_EVENT_S, 1)) " s of each other count as the same."
             @if all.len() > most { " The first " (most) " of " (all.len()) "." }
         };
@@ -314,7 +316,7 @@ impl Page<'_> {
         let listed = self.view.tasks.iter().enumerate();
         let mut listed = listed.filter(|(task, _)| self.listed.has_rows(*task));
         let found = listed.find_map(|(task, of)| {
-            // Events have no id of their own, but the difference refers to the event itself.
+            // Events have no ID of their own, but the difference refers to the event itself.
             let index = of.events.iter().position(|event| std::ptr::eq(event, d.event))?;
             Some(event_id(task, index))
         });
@@ -350,7 +352,7 @@ fn gain_table(a: &str, b: &str, rows: &[&PairSummary]) -> Markup {
 }
 
 fn gain_row(row: &PairSummary, figure: &Figure, place: ComparisonSpace) -> Markup {
-    // The difference is that of `b` from `a`, so a better one than 0 speaks for `b`.
+    // The difference is `b - a`, so a value that is better than 0 favours `b`.
     let winner = if figure.better(row.difference, 0.0) { &row.b } else { &row.a };
     let better = match (row.difference == 0.0, row.is_clear()) {
         (true, _) => html! { "equal" },

@@ -5,11 +5,11 @@ use super::{Page, cell, column, no_cell, optional_cell, signed, table};
 use crate::chart::key;
 use crate::model::TaskResult;
 
-/// Most rows that are shown without being asked for.
+/// Maximum number of rows that are not folded.
 const MOST_OPEN: usize = 6;
 
 impl Page<'_> {
-    /// Renders the HOTA of each task, and the gain by repairing one kind of error alone.
+    /// Renders the HOTA of each task, and the gain from repairing each kind of error alone.
     pub(super) fn repairs(&self) -> Option<Markup> {
         let tasks = self.view.tasks.iter().copied();
         let tasks: Vec<&TaskResult> = tasks.filter(|task| !task.repairs.is_empty()).collect();
@@ -22,7 +22,7 @@ impl Page<'_> {
         };
         let body = html! { @for task in &tasks { (self.repair_row(task)) } };
         let caption = html! {
-            "HOTA as it is, and the gain if the truth repaired one kind of error alone; the largest gain in bold."
+            "HOTA as measured, and its gain if one kind of error alone were corrected from the truth; the largest gain in bold."
         };
         Some(html! {
             p { "The largest gain of a row shows the kind of error to work on: identities, false tracks, misses, or positions of the boxes." }
@@ -56,7 +56,7 @@ impl Page<'_> {
     }
 }
 
-/// The gain of HOTA by a repair.
+/// Returns the gain in HOTA from a repair.
 fn gain_of(row: &Repaired, hota: Option<f64>) -> Option<f64> {
     Some(row.hota? - hota?)
 }

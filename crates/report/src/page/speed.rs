@@ -13,8 +13,8 @@ impl Page<'_> {
         let Some(timings) = self.timings else {
             return html! {
                 p {
-                    @if self.timings_left_out { "The times are left out, because the machine had other work while they were taken. " }
-                    @else { "No times were taken. " }
+                    @if self.timings_left_out { "The times are left out, because the machine had other work while they were measured. " }
+                    @else { "No times were measured. " }
                     "Run the benchmark with " code { "--timing" } " on a machine that does nothing else, to see accuracy against time here."
                 }
             };
@@ -62,7 +62,7 @@ impl Page<'_> {
         Some(html! {
             figure {
                 (front(&marks, &accuracy_name, &words))
-                figcaption { "Up and to the left is better. The line joins those that no other pipeline beats in both." }
+                figcaption { "Up and to the left is better. The line joins the pipelines that no other one beats in both." }
             }
         })
     }
@@ -94,7 +94,7 @@ impl Page<'_> {
         };
         table(
             "Times of the stages",
-            &html! { "Time per frame and stage, mean over the tasks of a pipeline; of the slowest frames the slowest." },
+            &html! { "Time per frame and stage, mean over the tasks of a pipeline; for the slowest frames the maximum." },
             &head,
             &body,
         )
@@ -135,7 +135,7 @@ fn stage_rows(times: &[&TaskTiming]) -> Vec<StageRow> {
         .map(|t| [t.frame_ms_p50, t.frame_ms_p95, t.frame_ms_p99, t.frame_ms_max])
         .collect();
     let mut by_stage: BTreeMap<&str, Vec<[f64; 4]>> = BTreeMap::new();
-    // The map sorts by name; the rows keep the order of the pipeline.
+    // The map sorts by name, but the rows keep the order of the pipeline.
     let mut order: Vec<&str> = Vec::new();
     for stage in times.iter().flat_map(|t| &t.stages) {
         if !order.contains(&stage.stage.as_str()) {

@@ -9,10 +9,10 @@ use crate::chart::key;
 use crate::figures::{ComparisonSpace, FEW_SCORES, has_few_scores, lamr_of_enough_scores};
 use crate::model::{Outcome, TaskResult};
 
-/// Name of an outcome that is a fault, not a choice.
+/// Name of an outcome that is an error, not a choice.
 const FAILED: &str = "failed";
 
-/// Returns tasks by outcome and reason: one reason may skip a pipeline on many logs.
+/// Returns tasks by outcome and reason, because one reason may skip a pipeline on many logs.
 fn by_reason<'a>(
     tasks: &[(&'a TaskResult, (&'a str, &'a str))],
 ) -> BTreeMap<(&'a str, &'a str), Vec<&'a TaskResult>> {
@@ -23,7 +23,7 @@ fn by_reason<'a>(
     reasons
 }
 
-/// Returns the different names in tasks, in their order.
+/// Returns the distinct names in tasks, in alphabetical order.
 fn names<'a>(tasks: &[&'a TaskResult], name: fn(&TaskResult) -> &String) -> BTreeSet<&'a str> {
     tasks.iter().copied().map(|task| name(task).as_str()).collect()
 }
@@ -34,7 +34,8 @@ impl Page<'_> {
             self.view.tasks.iter().filter_map(|t| Some((*t, reason(&t.outcome)?))).collect();
         let lost: Vec<&TaskResult> =
             self.view.tasks.iter().copied().filter(|t| t.data_lost).collect();
-        // Failures are to be seen; of skipped tasks, which no log suits, there may be hundreds.
+        // Failures must be visible; of tasks that are skipped because no log fits there may be
+        // hundreds.
         let is_open = not_done.len() <= MOST_UNFOLDED
             || not_done.iter().any(|(_, (outcome, _))| *outcome == FAILED);
         let head = html! { (column("Pipelines", None)) (column("Logs", None)) (column("Tasks", None)) (column("Outcome", None)) (column("Why", None)) };
@@ -50,7 +51,7 @@ impl Page<'_> {
             }
         };
         (!not_done.is_empty() || !lost.is_empty()).then(|| html! {
-            p { "None of these enters a mean. A pipeline with fewer logs than another is marked, and is never called the best." }
+            p { "None of these is in a mean. A pipeline with fewer logs than another is marked, and is never called the best." }
             @if !not_done.is_empty() {
                 details class="print" open[is_open] {
                     summary { (counted(not_done.len(), "task")) }
@@ -63,7 +64,7 @@ impl Page<'_> {
         })
     }
 
-    /// Names the tasks with a meaningless LAMR because all scores, or nearly all, are equal.
+    /// Names the tasks whose LAMR has no meaning because all scores, or nearly all, are equal.
     pub(super) fn constant_scores(&self) -> Option<Markup> {
         let constant: Vec<&TaskResult> = self
             .view
@@ -78,7 +79,8 @@ impl Page<'_> {
             details class="print" open[constant.len() <= MOST_UNFOLDED] {
                 summary { "LAMR and AP mean nothing in " (counted(constant.len(), "task")) }
                 p {
-                    "Where the reports have fewer than " (FEW_SCORES) " different scores, no threshold tells sure reports from unsure ones; LAMR is left out: "
+                    "Where the reports have fewer than " (FEW_SCORES) " different scores, no \
+                     threshold separates reliable reports from unreliable ones; LAMR is left out: "
                     @for (i, t) in constant.iter().enumerate() { @if i > 0 { ", " } (t.pipeline) " on " (t.log) } "."
                 }
             }
@@ -90,7 +92,7 @@ impl Page<'_> {
             return None;
         }
         let body = html! { @for task in &self.view.tasks { (self.task_row(task)) } };
-        let caption = html! { "In the image where boxes are known, else on the floor. report.csv has every figure of both." };
+        let caption = html! { "In the image if boxes are known, otherwise on the floor. report.csv has every figure of both." };
         Some(html! {
             details class="print" {
                 summary { "One row per pipeline, log and seed" }
@@ -144,7 +146,8 @@ impl Page<'_> {
                 }
             }
         };
-        let caption = html! { "The beginning of each SHA-256; the whole ones are in report.json." };
+        let caption =
+            html! { "The first digits of each SHA-256; the full ones are in report.json." };
         Some(html! {
             p { "Tagalong " (self.view.version) ". A task with the same hash has the same result, to the byte." }
             details { summary { "Hashes of tasks and inputs" } (table("Hashes", &caption, &head, &body)) }
@@ -183,9 +186,9 @@ fn task_head() -> Markup {
     ];
     html! {
         @for name in plain { (column(name, None)) }
-        (column("MT / PT / ML", Some("People tracked mostly, partly and hardly")))
+        (column("MT / PT / ML", Some("People mostly tracked, partly tracked and mostly lost")))
         (column("Error [m]", Some("Mean position error on the floor")))
-        (column("NIS", Some("Mean, its bounds, and what they say of the filter")))
+        (column("NIS", Some("Mean, its bounds, and what they say about the filter")))
     }
 }
 

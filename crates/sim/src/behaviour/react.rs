@@ -1,4 +1,4 @@
-//! Steps of people that react to others by a model of crowds.
+//! Steps of people that react to others according to a crowd model.
 
 use nalgebra::{Point2, Rotation2, Vector2};
 
@@ -6,12 +6,12 @@ use super::{Lead, Walker};
 use crate::crowd::{Agent, Around, Blocks};
 use crate::scene::AtEnd;
 
-/// Largest angle, rad, by which a person misses the direction of the goal: without it people that meet
-/// in perfect symmetry would wait for each other for ever.
+/// Maximum angular error of the walking direction, rad: without it, people that meet in perfect
+/// symmetry would wait for each other for ever.
 const MISSES_RAD: f64 = 0.03;
-/// A person with so little headway, as a part of the wanted speed, for so long, s, steps back to
-/// the right, rad, for some time, s: otherwise a crowd is jammed in an arch for ever in which no person
-/// can go on. People are patient for different times, of which this is the longest difference, s.
+/// A person whose progress, as a fraction of the wanted speed, is this low for this time, s, steps
+/// back to the right by this angle, rad, for some time, s. Otherwise a crowd could jam in an arch
+/// for ever. The patience of people differs by up to the last of these times, s.
 const JAMMED: f64 = 0.3;
 const JAMMED_S: f64 = 1.5;
 const MORE_PATIENT_S: f64 = 3.0;
@@ -19,17 +19,17 @@ const STEPS_BACK_S: f64 = 1.5;
 const STEPS_BACK_RAD: f64 = 2.2;
 
 impl Walker {
-    /// Returns true if the person has a walk by a model of crowds.
+    /// Returns true if the person walks according to a crowd model.
     pub fn reacts(&self) -> bool {
         !self.settings.walk.is_plain()
     }
 
-    /// Returns true if the person may give way to others: a seated one stays.
+    /// Returns true if the person may give way to others; a seated one does not.
     pub fn gives_way(&self) -> bool {
         self.reacts() && self.stance.seated == 0.0
     }
 
-    /// Returns true if the person has come to the end of the path, and stays there.
+    /// Returns true if the person has reached the end of the path, and stays there.
     pub fn has_arrived(&self) -> bool {
         self.settings.path.len() > 1 && self.ahead >= self.settings.path.len()
     }
@@ -39,7 +39,8 @@ impl Walker {
         Agent { place: self.stance.place, velocity: self.velocity, radius_m }
     }
 
-    /// Moves by a short time among others; `number` is that of the person in the scene.
+    /// Moves the person by a time step among others; `number` is the index of the person in the
+    /// scene.
     pub fn react(
         &mut self,
         now_s: f64,
@@ -74,8 +75,8 @@ impl Walker {
         self.finish_step(now_s, dt, lead);
     }
 
-    /// Returns the angle by which a person without headway for long turns to the right, rad.
-    /// The time for which an object has blocked the walker is negative while they step back.
+    /// Returns the angle by which a person without progress turns to the right, rad. The time for
+    /// which an obstacle has blocked the walker is negative while they step back.
     fn jam_rad(&mut self, wanted: &Vector2<f64>, number: usize, dt: f64) -> f64 {
         if self.held_up_s < 0.0 {
             self.held_up_s = (self.held_up_s + dt).min(0.0);
@@ -90,13 +91,13 @@ impl Walker {
         0.0
     }
 
-    /// Moves the body to where no other body is.
+    /// Moves the body to a free position.
     pub fn place_at(&mut self, place: Point2<f64>) {
         self.stance.place = place;
     }
 
-    /// Returns the wanted velocity: straight to the goal or, where blocks are on the way, to the next
-    /// corner on the way round them.
+    /// Returns the wanted velocity: straight to the goal or, if blocks are in the way, to the next
+    /// corner on the way around them.
     fn towards_goal(&mut self, blocks: &Blocks) -> Vector2<f64> {
         let Some(goal) = self.settings.path.get(self.ahead).map(|goal| Point2::from(*goal)) else {
             return Vector2::zeros();
@@ -113,7 +114,7 @@ impl Walker {
         way.try_normalize(1e-6).unwrap_or_default() * speed_mps
     }
 
-    /// Returns the point to walk to on the way to a goal; a way is kept until a block is on it.
+    /// Returns the point to walk to on the way to a goal; a route is kept until a block is on it.
     fn next_turn(&mut self, goal: Point2<f64>, blocks: &Blocks) -> Point2<f64> {
         let place = self.stance.place;
         if blocks.is_empty() || blocks.is_free(&place, &goal) {
@@ -132,7 +133,7 @@ impl Walker {
     }
 }
 
-/// Returns a share from 0 to 1 that is another one for each number, spread evenly by the golden ratio.
+/// Returns a number from 0 to 1 that differs for each index, spread evenly by the golden ratio.
 fn share(number: usize) -> f64 {
     const GOLDEN: f64 = 0.618_033_988_749_895;
     (number as f64 * GOLDEN).fract()

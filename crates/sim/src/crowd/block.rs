@@ -6,11 +6,11 @@ use crate::material::Material;
 use crate::shape::{Form, Shape};
 use crate::world::Object;
 
-/// A block of wall from the floor to the ceiling.
+/// A wall block from the floor to the ceiling.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Block {
-    /// Its middle, m.
+    /// Centre, m.
     #[schemars(inner(range(min = -1000.0, max = 1000.0)))]
     pub at: [f64; 2],
     /// Length and width, m.
@@ -33,7 +33,7 @@ impl Block {
         Vector2::from(self.size_m) * 0.5
     }
 
-    /// Returns the nearest point of its surface or, for a place inside, that place.
+    /// Returns the nearest point of its surface or, for a position inside, that position.
     pub(crate) fn nearest(&self, place: &Point2<f64>) -> Point2<f64> {
         let own = self.pose().inverse_transform_point(place);
         let half = self.half_m();
@@ -41,13 +41,13 @@ impl Block {
         self.pose() * inside
     }
 
-    /// Returns the place, moved to be at least this far outside, m.
+    /// Returns the position, moved if necessary to be at least this far outside, m.
     pub(crate) fn outside(&self, place: &Point2<f64>, margin_m: f64) -> Point2<f64> {
         let own = self.pose().inverse_transform_point(place);
         let half = self.half_m();
         let depth = half - own.coords.abs();
         if depth.min() > 0.0 {
-            // Out through the nearest side.
+            // Moved out through the nearest side.
             let axis = depth.imin();
             let mut out = own;
             out[axis] = (half[axis] + margin_m).copysign(own[axis]);
@@ -61,8 +61,8 @@ impl Block {
         }
     }
 
-    /// Returns the free distance from the block to a place as the larger of those along and across
-    /// it, m; negative inside.
+    /// Returns the free distance between the block and a position as the larger of those along and
+    /// across it, m; negative inside.
     pub(crate) fn gap_m(&self, place: &Point2<f64>) -> f64 {
         let own = self.pose().inverse_transform_point(place);
         (own.coords.abs() - self.half_m()).max()
@@ -76,7 +76,8 @@ impl Block {
             .map(|[x, y]| pose * Point2::new(half.x * x, half.y * y))
     }
 
-    /// Returns true if a straight way leads through the block, widened by a margin, m.
+    /// Returns true if the straight line between two points passes through the block, widened by a
+    /// margin, m.
     pub(crate) fn is_on_way(&self, from: &Point2<f64>, to: &Point2<f64>, margin_m: f64) -> bool {
         let start = self.pose().inverse_transform_point(from);
         let way = self.pose().inverse_transform_vector(&(to - from));
@@ -98,13 +99,13 @@ impl Block {
         enters < leaves
     }
 
-    /// Returns its solid, up to a ceiling of this height, m.
+    /// Returns the solid of the block, up to a ceiling of this height, m.
     pub(crate) fn solid(&self, height_m: f64) -> Object {
         let half = self.half_m().push(0.5 * height_m);
         let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), self.heading_deg.to_radians());
         let at = Point3::new(self.at[0], self.at[1], half.z);
         let paint = Material::plain([0.62, 0.60, 0.55]);
-        // As the walls of the room: a lamp may hang inside of it.
+        // Casts no shadow, like the walls of the room, because a lamp may hang inside of it.
         Object::new(vec![Shape::new(Form::Block(half), at, turn, paint)], None, false)
     }
 }

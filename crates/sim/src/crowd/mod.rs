@@ -1,5 +1,5 @@
-//! Reacting people: to each other, to the robot, to blocks and to furniture, by a published model
-//! of crowds instead of the ordinary walk.
+//! People that react to each other, to the robot, to blocks and to furniture according to a
+//! published crowd model, instead of the plain walk.
 
 mod block;
 mod orca;
@@ -16,24 +16,23 @@ pub(crate) use route::Blocks;
 
 use crate::obstacle::Obstacle;
 
-/// Way of walking of a person.
+/// Walking model of a person.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Walk {
-    /// Along the path, pushed aside by people and furniture that are near.
+    /// Along the path, with repulsion from people and furniture nearby.
     #[default]
     Plain,
-    /// By the social force model: M. Moussaïd, D. Helbing et al., Experimental study of the
-    /// behavioural mechanisms underlying self-organization in human crowds, Proc. R. Soc. B 276
-    /// (2009).
+    /// Social force model: M. Moussaïd, D. Helbing et al., Experimental study of the behavioural
+    /// mechanisms underlying self-organization in human crowds, Proc. R. Soc. B 276 (2009).
     SocialForce,
-    /// By optimal reciprocal collision avoidance: J. van den Berg et al., Reciprocal n-body
-    /// collision avoidance, ISRR 2009.
+    /// Optimal reciprocal collision avoidance: J. van den Berg et al., Reciprocal n-body collision
+    /// avoidance, ISRR 2009.
     Orca,
 }
 
 impl Walk {
-    /// Returns true for the ordinary walk.
+    /// Returns true for the plain walk.
     pub(crate) fn is_plain(&self) -> bool {
         *self == Self::Plain
     }
@@ -45,23 +44,23 @@ settings! {
         /// Radius of a body, m.
         #[schemars(range(min = 0.1, max = 0.6))]
         pub radius_m: f64 = 0.3,
-        /// Distance that the middle of a person keeps from the body of another, m; used by `orca`.
+        /// Distance between the centre of a person and the body of another, m; used by `orca`.
         #[schemars(range(max = 2.0))]
         pub safe_distance_m: f64 = 0.5,
-        /// Largest change of velocity, m/s².
+        /// Maximum acceleration, m/s².
         #[schemars(range(min = 0.1, max = 20.0))]
         pub acceleration_mps2: f64 = 1.0,
         /// Time for which velocities are free of collisions with others, s; used by `orca`.
         #[schemars(range(min = 0.2, max = 20.0))]
         pub horizon_s: f64 = 2.0,
-        /// A point of the path counts as reached within this distance, m.
+        /// Distance within which a point of the path counts as reached, m.
         #[schemars(range(min = 0.1, max = 5.0))]
         pub reached_m: f64 = 0.5,
     }
 }
 
 impl CrowdSettings {
-    /// Returns true if nothing is set.
+    /// Returns true if all settings have their defaults.
     pub(crate) fn is_default(&self) -> bool {
         *self == Self::default()
     }
@@ -78,18 +77,18 @@ impl CrowdSettings {
 /// A body that moves on the floor, as others perceive it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Agent {
-    /// Where it is, m.
+    /// Position, m.
     pub place: Point2<f64>,
-    /// Its velocity, m/s.
+    /// Velocity, m/s.
     pub velocity: Vector2<f64>,
-    /// Its radius, m.
+    /// Radius, m.
     pub radius_m: f64,
 }
 
-/// Everything that a person reacts to.
+/// Everything to which a person reacts.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Around<'a> {
-    /// The others, and the robot.
+    /// The other people, and the robot.
     pub others: &'a [Agent],
     /// Furniture.
     pub obstacles: &'a [Obstacle],
@@ -100,7 +99,7 @@ pub(crate) struct Around<'a> {
 }
 
 impl Around<'_> {
-    /// Returns the nearest point of each thing that stands, for a body at a place: those of blocks
+    /// Returns the nearest point of each fixed object for a body at this position: those of blocks
     /// and walls, and those of furniture.
     fn surfaces(&self, place: &Point2<f64>) -> Vec<Point2<f64>> {
         let round = self.obstacles.iter().filter_map(|thing| {
@@ -110,8 +109,7 @@ impl Around<'_> {
         self.blocks.nearest(place).chain(round).collect()
     }
 
-    /// Returns the velocity that a person chooses with the wish for the velocity `wanted` and
-    /// is never faster than `max_mps`.
+    /// Returns the velocity of a person with the wanted velocity `wanted`, at most `max_mps` fast.
     pub fn velocity(
         &self,
         walk: Walk,
@@ -127,8 +125,8 @@ impl Around<'_> {
     }
 }
 
-/// Moves bodies apart that overlap, because bodies are solid: each gives way for its part, and those
-/// with the part 0 stay where they are.
+/// Separates overlapping bodies, because bodies are solid: each is moved in proportion to its
+/// share, and those with share 0 stay in place.
 pub(crate) fn part_bodies(bodies: &mut [(Point2<f64>, f64)], radius_m: f64) {
     const ROUNDS: usize = 10;
     for _ in 0..ROUNDS {

@@ -1,23 +1,23 @@
-//! Optimal reciprocal collision avoidance: each of two bodies changes its velocity by half of what
-//! keeps them apart for a time, and takes the velocity nearest to the wanted one that all of its
-//! half planes allow.
+//! Optimal reciprocal collision avoidance: each of two bodies makes half of the change of velocity
+//! that keeps them apart for a time, and takes the velocity nearest to the wanted one that all of
+//! its half planes allow.
 //!
-//! J. van den Berg, S. J. Guy, M. Lin, D. Manocha, Reciprocal n-body collision avoidance, ISRR 2009,
-//! sections 4 and 5. Where the half planes leave no velocity, those of things that stand hold, and
-//! the largest violation of the others is made as small as possible (section 5.3).
+//! J. van den Berg, S. J. Guy, M. Lin, D. Manocha, Reciprocal n-body collision avoidance, ISRR
+//! 2009, sections 4 and 5. If the half planes allow no velocity, those of fixed objects are kept,
+//! and the largest violation of the others is minimised (section 5.3).
 
 use nalgebra::Vector2;
 
 use super::{Agent, Around};
 
-/// Farther bodies leave the velocity alone, m.
+/// Distance beyond which bodies have no influence, m.
 const NEIGHBOURS_M: f64 = 6.0;
-/// Time in which bodies that are too near to each other part, s.
+/// Time in which bodies that are too close separate, s.
 const PARTS_S: f64 = 0.5;
-/// Time for which velocities are free of collisions with things that stand, s: people pass close to
+/// Time for which velocities are free of collisions with fixed objects, s: people pass close to
 /// walls.
 const THINGS_S: f64 = 0.5;
-/// Error of arithmetic, m/s.
+/// Rounding error, m/s.
 const EPSILON: f64 = 1e-9;
 
 /// Allowed velocities: those whose component along `normal` is at least `least`.
@@ -25,12 +25,12 @@ const EPSILON: f64 = 1e-9;
 pub(super) struct HalfPlane {
     /// Direction of length one.
     pub normal: Vector2<f64>,
-    /// The component, m/s.
+    /// Minimum of the component, m/s.
     pub least: f64,
 }
 
 impl HalfPlane {
-    /// Returns how far a velocity violates the half plane, m/s; negative inside of it.
+    /// Returns the amount by which a velocity violates the half plane, m/s; negative inside of it.
     pub fn violation(&self, velocity: &Vector2<f64>) -> f64 {
         self.least - self.normal.dot(velocity)
     }
@@ -57,7 +57,7 @@ pub(super) fn velocity(
         .iter()
         .filter(|other| (other.place - me.place).norm() < NEIGHBOURS_M)
         .collect();
-    // The first half planes win where arithmetic decides: those of near bodies.
+    // If rounding decides, the first half planes win: those of near bodies.
     others.sort_by(|a, b| {
         let [a, b] = [a, b].map(|other| (other.place - me.place).norm_squared());
         a.total_cmp(&b)
@@ -67,8 +67,8 @@ pub(super) fn velocity(
     solve(&planes, standing, wanted, max_mps)
 }
 
-/// Returns the half plane of a point of a thing that stands, at this way from the body: with the
-/// velocity zero as the one to keep, as the paper has it, a velocity always exists.
+/// Returns the half plane of a point of a fixed object, at this offset from the body: with zero as
+/// the velocity to keep, as in the paper, an allowed velocity always exists.
 fn beside(me: &Agent, way: &Vector2<f64>) -> Option<HalfPlane> {
     let towards = way.try_normalize(1e-9)?;
     let gap_m = way.norm() - me.radius_m;
@@ -76,7 +76,7 @@ fn beside(me: &Agent, way: &Vector2<f64>) -> Option<HalfPlane> {
     Some(HalfPlane { normal: -towards, least: -speed_mps })
 }
 
-/// Returns the half plane of a body that is expected to do the other half of the avoiding.
+/// Returns the half plane of a body that is expected to do the other half of the avoidance.
 fn reciprocal(me: &Agent, other: &Agent, margin_m: f64, horizon_s: f64) -> HalfPlane {
     let way = other.place - me.place;
     let relative = me.velocity - other.velocity;
@@ -84,7 +84,7 @@ fn reciprocal(me: &Agent, other: &Agent, margin_m: f64, horizon_s: f64) -> HalfP
     let away2 = way.norm_squared();
     let is_apart = away2 > radius_m * radius_m;
     let time_s = if is_apart { horizon_s } else { PARTS_S };
-    // From the middle of the disc that cuts off the cone of colliding velocities.
+    // From the centre of the disc that truncates the cone of colliding velocities.
     let from_disc = relative - way / time_s;
     let ahead = from_disc.dot(&way);
     let before_disc = ahead < 0.0 && ahead * ahead > radius_m * radius_m * from_disc.norm_squared();
@@ -104,7 +104,7 @@ fn reciprocal(me: &Agent, other: &Agent, margin_m: f64, horizon_s: f64) -> HalfP
     half_of(me, Vector2::new(-along.y, along.x), change)
 }
 
-/// Returns the direction away from another body; any where both are in one place.
+/// Returns the direction away from another body; an arbitrary one if both are at the same position.
 fn opposite(way: &Vector2<f64>) -> Vector2<f64> {
     way.try_normalize(1e-9).map_or_else(Vector2::x, |towards| -towards)
 }
@@ -114,8 +114,9 @@ fn half_of(me: &Agent, normal: Vector2<f64>, change: Vector2<f64>) -> HalfPlane 
     HalfPlane { normal, least: normal.dot(&(me.velocity + 0.5 * change)) }
 }
 
-/// Returns the allowed velocity nearest to the wanted one, or, where there is none, the one with the
-/// smallest largest violation of the half planes after the first `standing`, which hold.
+/// Returns the allowed velocity nearest to the wanted one or, if there is none, the one that
+/// minimises the largest violation of the half planes after the first `standing`, which are always
+/// kept.
 pub(super) fn solve(
     planes: &[HalfPlane],
     standing: usize,
@@ -128,7 +129,7 @@ pub(super) fn solve(
     }
 }
 
-/// Meaning of the best velocity.
+/// Criterion for the best velocity.
 #[derive(Clone, Copy)]
 enum Goal {
     /// Nearest to this one.
@@ -147,13 +148,13 @@ impl Goal {
     }
 }
 
-/// A velocity that some half plane refused, and the number of that plane.
+/// A velocity that a half plane rejected, and the index of that half plane.
 struct Failed {
     velocity: Vector2<f64>,
     plane: usize,
 }
 
-/// Solves the linear program in the plane by taking in one half plane after the other.
+/// Solves the linear program in the plane by adding one half plane after the other.
 fn nearest(planes: &[HalfPlane], goal: Goal, max_mps: f64) -> Result<Vector2<f64>, Failed> {
     let mut velocity = goal.free(max_mps);
     for (plane, half_plane) in planes.iter().enumerate() {
@@ -166,8 +167,8 @@ fn nearest(planes: &[HalfPlane], goal: Goal, max_mps: f64) -> Result<Vector2<f64
     Ok(velocity)
 }
 
-/// Returns the best velocity on the edge of a half plane within those before it; `None` if the edge
-/// has no allowed velocity.
+/// Returns the best velocity on the edge of a half plane within the half planes before it; `None`
+/// if the edge has no allowed velocity.
 fn best_on_edge(
     edge: &HalfPlane,
     before: &[HalfPlane],
@@ -206,7 +207,7 @@ fn best_on_edge(
     Some(foot + along * best)
 }
 
-/// Returns the velocity with the smallest largest violation of half planes of bodies.
+/// Returns the velocity that minimises the largest violation of the half planes of bodies.
 fn least_violation(
     planes: &[HalfPlane],
     standing: usize,
@@ -215,7 +216,8 @@ fn least_violation(
 ) -> Vector2<f64> {
     let mut velocity = failed.velocity;
     if failed.plane < standing {
-        // Only arithmetic excludes the velocity zero here, or a body that is pressed into a corner.
+        // Only rounding can exclude the velocity zero here, or a body that is pressed into a
+        // corner.
         return Vector2::zeros();
     }
     let mut worst = 0.0;

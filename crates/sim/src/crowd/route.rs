@@ -1,10 +1,10 @@
-//! Ways around blocks: the shortest one over the corners of blocks.
+//! Routes around blocks: the shortest one via the corners of blocks.
 
 use nalgebra::Point2;
 
 use super::Block;
 
-/// Corners lie this far outside of the margin of ways, m.
+/// Distance of corners outside of the margin of routes, m.
 const OFF_CORNER_M: f64 = 0.05;
 
 /// The blocks of a scene and the walls of its room.
@@ -12,16 +12,16 @@ const OFF_CORNER_M: f64 = 0.05;
 pub(crate) struct Blocks {
     blocks: Vec<Block>,
     room_m: [f64; 2],
-    /// Ways keep this far away from blocks, m.
+    /// Distance of routes from blocks, m.
     margin_m: f64,
-    /// Points at which a way may turn.
+    /// Points at which a route may turn.
     corners: Vec<Point2<f64>>,
     /// Corners that can be reached from each corner in a straight line, with the distances, m.
     reached: Vec<Vec<(usize, f64)>>,
 }
 
 impl Blocks {
-    /// Prepares ways that keep a margin from blocks, m.
+    /// Prepares routes that keep a margin from blocks, m.
     pub fn new(blocks: &[Block], room_m: [f64; 2], margin_m: f64) -> Self {
         let mut all = Self { blocks: blocks.to_vec(), room_m, margin_m, ..Self::default() };
         for corner in blocks.iter().flat_map(|block| block.corners(margin_m + OFF_CORNER_M)) {
@@ -53,7 +53,7 @@ impl Blocks {
         walls.into_iter().chain(self.blocks.iter().map(move |block| block.nearest(&place)))
     }
 
-    /// Returns the place, moved out of blocks and into the room with a body of this radius, m.
+    /// Returns the position, moved out of blocks and into the room for a body of this radius, m.
     pub fn outside(&self, place: &Point2<f64>, radius_m: f64) -> Point2<f64> {
         let mut place = *place;
         for block in &self.blocks {
@@ -66,10 +66,10 @@ impl Blocks {
         place
     }
 
-    /// Returns true if no block is on the straight way between two points.
+    /// Returns true if no block is on the straight line between two points.
     pub fn is_free(&self, from: &Point2<f64>, to: &Point2<f64>) -> bool {
         self.blocks.iter().all(|block| {
-            // A body pressed to a block, or a goal beside one, is nearer than the margin.
+            // A body pressed against a block, or a goal beside one, is nearer than the margin.
             let nearest_m = block.gap_m(from).min(block.gap_m(to)) - 1e-6;
             !block.is_on_way(from, to, self.margin_m.min(nearest_m))
         })
@@ -80,8 +80,8 @@ impl Blocks {
         self.blocks.iter().any(|block| block.is_on_way(from, to, 0.0))
     }
 
-    /// Returns the points of the shortest way, its end included and its start not; the end alone if
-    /// there is no way.
+    /// Returns the points of the shortest route, including its end but not its start; only the end
+    /// if there is no route.
     pub fn route(&self, from: &Point2<f64>, to: &Point2<f64>) -> Vec<Point2<f64>> {
         if self.is_free(from, to) {
             return vec![*to];
@@ -123,7 +123,8 @@ impl Blocks {
         way
     }
 
-    /// Returns the corners in a straight line from a point, with their distances, m.
+    /// Returns the corners that can be reached in a straight line from a point, with their
+    /// distances, m.
     fn reached_from(&self, from: &Point2<f64>) -> Vec<(usize, f64)> {
         let all = self.corners.iter().enumerate();
         all.filter(|(_, corner)| self.is_free(from, corner))

@@ -14,7 +14,7 @@ impl Maker {
         self.shapes.extend(door_frame(self.at, &self.turn));
     }
 
-    /// As tall as a person, so that whole people are seen in it.
+    /// Adds a mirror as tall as a person, so that whole people are seen in it.
     pub(super) fn mirror(&mut self) {
         let wide = self.between(0.35, 0.6);
         let top = self.between(1.75, 2.0);
@@ -22,7 +22,7 @@ impl Maker {
         let wood = Material::plain(self.wood);
         let middle = 0.5 * (low + top);
         self.block([0.0, 0.0, middle], [0.005, wide, middle - low], Material::mirror());
-        // Of wood behind, too: a mirror is a mirror from one side only.
+        // The back is of wood, because a mirror reflects on one side only.
         self.block([-0.02, 0.0, middle], [0.014, wide + 0.04, middle - low + 0.04], wood);
         for y in [-1.0, 1.0] {
             self.block([0.0, y * (wide + 0.02), middle], [0.02, 0.02, middle - low], wood);

@@ -9,10 +9,10 @@ use crate::footprint::{Outline, ROBOT_RADIUS_M};
 use crate::obstacle::Obstacle;
 use crate::scene::Scene;
 
-/// Ways around blocks keep this much more than the radius of a body away from them, m: where two
-/// streams share a corner, both have room.
+/// Distance of routes from blocks in addition to the radius of a body, m, so that two streams have
+/// room at a shared corner.
 const MARGIN_M: f64 = 0.15;
-/// A person with the plain walk takes a block for a round thing of this radius, m, at its nearest
+/// For a person with the plain walk, a block is a round obstacle of this radius, m, at its nearest
 /// point.
 const BLOCK_M: f64 = 0.2;
 
@@ -22,20 +22,20 @@ pub(super) fn blocks(scene: &Scene) -> Blocks {
 }
 
 impl Simulation {
-    /// Moves all people by a short time.
+    /// Moves all people by a time step.
     pub(super) fn walk(&mut self, now_s: f64, dt: f64) {
         let robot = Point2::from(self.robot.pose.translation.vector);
-        // Tricks depend on the places of all people before any of them moves.
+        // Tricks depend on the positions of all people before any of them moves.
         let hidden = hidden_by(&self.walkers, &robot);
         play_tricks(&mut self.walkers, &hidden, now_s);
         let ways: Vec<_> = (0..self.walkers.len())
             .map(|i| (lead_of(&self.walkers, i), others(&self.walkers, i, now_s)))
             .collect();
-        // As before any of them moves, so that the order of people decides nothing.
+        // The state before any of them moves, so that the order of people does not matter.
         let agents: Vec<Option<Agent>> = self.agents(now_s);
         let ahead = self.robot.pose.rotation * Vector2::new(GOES_M, 0.0);
         let furniture = self.obstacles.len();
-        // The robot is an obstacle of this step only, because it moves.
+        // The robot is an obstacle only for this step, because it moves.
         self.obstacles.push(Obstacle { at: robot, radius_m: ROBOT_M, ahead });
         let steps = self.walkers.len() - usize::from(self.person_approaches());
         for (i, (lead, others)) in ways.iter().enumerate().take(steps) {
@@ -80,7 +80,7 @@ impl Simulation {
         people.chain([Some(robot)]).collect()
     }
 
-    /// Returns the radius of the circle around the robot's middle that surrounds it, m.
+    /// Returns the radius of the circle around the robot's middle that encloses it, m.
     pub(super) fn circumradius_m(&self) -> f64 {
         match self.outline(ROBOT_RADIUS_M) {
             Outline::Disc(radius_m) => radius_m,

@@ -1,33 +1,33 @@
-//! People around the robot in the plane, as a scanner all around it could see them.
+//! People around the robot in the plane, as a scanner with a full field of view could see them.
 
 use nalgebra::{Isometry2, Point2, Vector2};
 
 use super::Simulation;
 use crate::behaviour::Walker;
 
-/// Reach of the sight of a robot without a laser scanner, m.
+/// Range of sight of a robot without a laser scanner, m.
 const REACH_M: f64 = 5.0;
-/// Parts of the radius to either side of the middle of a body at which it may be seen.
+/// Lateral offsets from the middle of a body at which it may be seen, as fractions of its radius.
 const ASIDE: [f64; 3] = [0.0, 0.8, -0.8];
 
 /// The robot among people that react to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CrowdView {
-    /// The robot in the world, m and rad.
+    /// Pose of the robot in the world, m and rad.
     pub world_from_robot: Isometry2<f64>,
     /// Gap between the robot, taken as a disc around its outline, and the first person, m; `None`
     /// while that person is not in the room.
     pub target_gap_m: Option<f64>,
     /// Gap to the nearest other person, m; infinite without one.
     pub others_gap_m: f64,
-    /// The first person is within reach of the laser scanner, and nothing is before them.
+    /// True if the first person is within range of the laser scanner and not hidden.
     pub target_in_sight: bool,
-    /// The first person has come to the end of the path.
+    /// True if the first person has reached the end of the path.
     pub target_arrived: bool,
 }
 
 impl Simulation {
-    /// Returns the robot among people; `None` in a scene whose people do not react.
+    /// Returns the state of the robot among people; `None` in a scene whose people do not react.
     pub fn crowd_view(&self) -> Option<CrowdView> {
         if !self.walkers.iter().any(Walker::reacts) {
             return None;
@@ -50,13 +50,14 @@ impl Simulation {
         })
     }
 
-    /// Returns which of the people at these places in the world can be seen from a point: those within
-    /// reach of the laser scanner of whom a part is hidden by no other, no block and no furniture.
+    /// Returns which of the people at these positions in the world can be seen from a point: those
+    /// within range of the laser scanner that are not completely hidden by another person, a block
+    /// or furniture.
     pub fn in_sight(&self, from: &Point2<f64>, places: &[Point2<f64>]) -> Vec<bool> {
         (0..places.len()).map(|who| self.is_in_sight(from, places, who)).collect()
     }
 
-    /// Says whether one of the people at these places can be seen from a point.
+    /// Returns true if one of the people at these positions can be seen from a point.
     fn is_in_sight(&self, from: &Point2<f64>, places: &[Point2<f64>], who: usize) -> bool {
         let reach_m = self.scene.laser.as_ref().map_or(REACH_M, |laser| laser.max_range_m);
         let radius_m = self.scene.reacting.radius_m;
@@ -76,7 +77,8 @@ impl Simulation {
     }
 }
 
-/// Returns true if a disc lies on the straight line between two points; one around an end does not.
+/// Returns true if a disc intersects the straight line between two points; one around an end does
+/// not count.
 fn is_between(
     (middle, radius_m): (Point2<f64>, f64),
     from: &Point2<f64>,

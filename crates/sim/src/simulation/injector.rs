@@ -14,9 +14,9 @@ use crate::obstacle_sensors::{SensorData, SensorReading};
 use crate::random::{normal_at, uniform_at};
 use crate::robot::{Encoder, WheelFaults};
 
-/// Distance of a saturated pixel, m: the largest number of 16 bits in millimetres.
+/// Depth of a saturated pixel, m: the maximum of 16 bits in millimetres.
 const SATURATED_M: f32 = 65.535;
-/// Noise never makes a distance shorter than this, m.
+/// Minimum distance after noise is added, m.
 const NEAREST_NOISY_M: f32 = 0.001;
 
 /// Injected faults of a scene, with the data that they repeat.
@@ -30,21 +30,21 @@ pub(super) struct Injector {
     held_scan: Option<Vec<f32>>,
     /// Readings of further sensors before a freeze, by the name of the sensor.
     held_readings: BTreeMap<Arc<str>, SensorData>,
-    /// Shot that arrived last.
+    /// The last shot that arrived.
     last: Option<Box<Shot>>,
     /// Odometry before a freeze.
     reading: Option<OdometryReading>,
-    /// Whole odometry of the step before.
+    /// Unchanged odometry of the previous step.
     whole: Option<OdometryReading>,
     odometer: Option<Odometer>,
 }
 
-/// Odometry that measured another motion than the robot's for some time.
+/// Odometry that has measured another motion than the robot's for some time.
 #[derive(Clone, Copy, Debug)]
 struct Odometer {
-    /// Pose that was told instead.
+    /// Pose that was reported instead.
     told: Isometry2<f64>,
-    /// Angles of the wheels that were told instead, rad.
+    /// Angles of the wheels that were reported instead, rad.
     angles_rad: [f64; 2],
 }
 
@@ -58,7 +58,7 @@ impl Injector {
         &self.faults
     }
 
-    /// Returns the fault of a kind that is there at a time.
+    /// Returns the fault of a kind that is active at a time.
     fn active(&self, kind: FaultKind, at_ns: u64) -> Option<&ScheduledFault> {
         let at_s = at_ns as f64 * 1e-9;
         self.faults.iter().find(|fault| fault.kind == kind && fault.is_active(at_s))
@@ -68,12 +68,12 @@ impl Injector {
         self.active(kind, at_ns).is_some()
     }
 
-    /// Returns the size of a fault that is there at a time; 0 without it.
+    /// Returns the size of a fault that is active at a time; 0 without one.
     fn size(&self, kind: FaultKind, at_ns: u64) -> f64 {
         self.active(kind, at_ns).map_or(0.0, |fault| fault.size)
     }
 
-    /// Returns true if the images of a time never arrive.
+    /// Returns true if the images at this time never arrive.
     pub(super) fn drops(&self, at_ns: u64) -> bool {
         self.is_active(FaultKind::Drop, at_ns)
     }
@@ -81,7 +81,7 @@ impl Injector {
     /// Returns the time on the robot's clock, ns.
     pub(super) fn robot_clock_ns(&self, at_ns: u64) -> u64 {
         let ahead_s = self.size(FaultKind::ClockForward, at_ns);
-        // No stamp lies before the start: there is none.
+        // No stamp may be before the start.
         let back_s = self
             .active(FaultKind::ClockBack, at_ns)
             .map_or(0.0, |fault| fault.size.min(fault.from_s));
@@ -98,14 +98,15 @@ impl Injector {
         }
     }
 
-    /// Returns the camera as it is mounted at a time.
+    /// Returns the camera with its mount at a time.
     pub(super) fn mounted(&self, camera: &Camera, at_ns: u64) -> Camera {
         let turned_deg =
             self.size(FaultKind::MountMoved, at_ns) + self.size(FaultKind::MountKnocked, at_ns);
         turned(camera, turned_deg)
     }
 
-    /// Returns the camera as the robot describes it at a time; the same one while that is unchanged.
+    /// Returns the camera as the robot describes it at a time; the same object while it is
+    /// unchanged.
     pub(super) fn described(&self, camera: &Arc<Camera>, at_ns: u64) -> Arc<Camera> {
         let calibrated = self.active(FaultKind::CalibrationChanged, at_ns);
         let turned_deg = self.size(FaultKind::MountMoved, at_ns);
@@ -138,7 +139,7 @@ impl Injector {
         self.resend(shot)
     }
 
-    /// Returns the last shot in place of a new one while the camera sends it again.
+    /// Returns the last shot instead of a new one while the camera repeats it.
     fn resend(&mut self, shot: Shot) -> Shot {
         let resends = self.is_active(FaultKind::Resend, shot.captured_ns);
         if let Some(last) = self.last.as_ref().filter(|_| resends) {
@@ -149,7 +150,7 @@ impl Injector {
         shot
     }
 
-    /// Repeats what is frozen, and remembers what is not.
+    /// Repeats frozen data, and stores the other data.
     fn freeze(&mut self, shot: &mut Shot) {
         let at_ns = shot.captured_ns;
         let all = self.is_active(FaultKind::FreezeAll, at_ns);
@@ -175,7 +176,7 @@ impl Injector {
             let pixels = Arc::make_mut(&mut depth).pixels_mut().iter_mut();
             for (z, key) in pixels.zip(0..) {
                 let noisy = *z + (fault.size * normal_at(seed, key)) as f32;
-                // A pixel without a reading stays without one.
+                // A pixel without a reading is left without one.
                 *z = if z.is_nan() { *z } else { noisy.max(NEAREST_NOISY_M) };
             }
         }
@@ -201,7 +202,7 @@ impl Injector {
             let Some(fault) = self.active(kind, at_ns) else { continue };
             let rays = ranges.len();
             for (ray, range) in ranges.iter_mut().enumerate() {
-                // The middle ray looks ahead, so the share counts from the middle.
+                // The middle ray points forward, so the share is counted from the middle.
                 let off = (ray as f64 + 0.5) / rays as f64 - 0.5;
                 if off.abs() <= 0.5 * fault.share {
                     *range = broken_range(kind, uniform_at(seed, ray as u64));
@@ -227,7 +228,7 @@ impl Injector {
         Some(reading)
     }
 
-    /// Returns the reading of the odometry as it arrives, or that there is none.
+    /// Returns the reading of the odometry as it arrives, or an event without one.
     pub(super) fn hear(&mut self, reading: OdometryReading) -> Event {
         if self.faults.is_empty() {
             return Event::Odometry(reading);
@@ -260,7 +261,7 @@ impl Injector {
         let factor =
             self.active(FaultKind::OdometryWrong, whole.at_ns).map_or(1.0, |fault| fault.size);
         let before = self.whole.replace(whole).unwrap_or(whole);
-        // Before the first fault nothing is added up, so that a whole reading stays as it is.
+        // Before the first fault nothing is accumulated, so that the reading is unchanged.
         if factor == 1.0 && self.odometer.is_none() {
             return whole;
         }
@@ -289,7 +290,7 @@ impl Injector {
     }
 }
 
-/// Puts the held data in place of new ones while they are frozen, and holds the new ones otherwise.
+/// Replaces new data by the stored data while it is frozen, and otherwise stores the new data.
 fn repeat<T: Clone>(data: &mut Option<T>, held: &mut Option<T>, is_frozen: bool) {
     match held {
         Some(held) if is_frozen && data.is_some() => *data = Some(held.clone()),
@@ -297,7 +298,7 @@ fn repeat<T: Clone>(data: &mut Option<T>, held: &mut Option<T>, is_frozen: bool)
     }
 }
 
-/// Returns the range of a broken ray; `chance` in 0 to 1 picks one.
+/// Returns the range of a broken ray; `chance` in 0 to 1 selects one.
 fn broken_range(kind: FaultKind, chance: f64) -> f32 {
     if kind == FaultKind::LaserNear {
         return f32::NEG_INFINITY;
@@ -309,7 +310,7 @@ fn broken_range(kind: FaultKind, chance: f64) -> f32 {
     }
 }
 
-/// Returns the columns that have readings: a share of them, scattered.
+/// Returns the columns that have readings: a scattered share of them.
 fn lit_columns(width: usize, share: f64, seed: u64) -> Vec<bool> {
     let mut order: Vec<usize> = (0..width).collect();
     order.sort_by_key(|column| number_at(seed, *column as u64));
@@ -321,7 +322,7 @@ fn lit_columns(width: usize, share: f64, seed: u64) -> Vec<bool> {
     lit
 }
 
-/// Returns a camera that looks so far to the left of its direction, at the same place.
+/// Returns a camera that is turned to the left by this angle, at the same position.
 fn turned(camera: &Camera, left_deg: f64) -> Camera {
     if left_deg == 0.0 {
         return camera.clone();

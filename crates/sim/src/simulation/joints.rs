@@ -7,25 +7,25 @@ use crate::hits::HitImage;
 use crate::mirror::MirrorCamera;
 use crate::render::WorldCamera;
 
-/// The surface of a body lies at most this far before its joints, m; what is farther before them
-/// is another part of it.
+/// Maximum distance of the surface of a body in front of its joints, m; anything farther in front
+/// is another part of the body.
 const FLESH_M: f64 = 0.2;
 
 /// A joint of a person.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Joint {
-    /// Name as in the keypoints of COCO, like `left_shoulder`.
+    /// Name in the keypoints of COCO, such as `left_shoulder`.
     pub name: &'static str,
-    /// In the robot frame, m.
+    /// Position in the robot frame, m.
     pub in_robot: Point3<f64>,
-    /// Place in the image, pixels, of a panorama camera in the unwrapped one; `None` outside.
+    /// Position in the image, pixels, for a panorama camera in the unwrapped one; `None` outside.
     pub pixel: Option<Point2<f64>>,
-    /// True if neither a thing nor another person nor another part of the same body stands before
-    /// it; with a panorama camera the own body never hides it.
+    /// True if no object, other person or other part of the same body hides it; with a panorama
+    /// camera the own body never hides it.
     pub in_sight: bool,
 }
 
-/// Pixel of a point in the image, and whether it is in sight; `None` outside.
+/// Pixel of a point in the image, and true if it is in sight; `None` outside.
 pub(super) type Spot = Option<(Point2<f64>, bool)>;
 
 /// Returns the joints of a person, with the `spot` of each point of the world.
@@ -45,7 +45,7 @@ pub(super) fn joints(
         .collect()
 }
 
-/// Returns how a joint of a person appears in an image through a lens.
+/// Returns the appearance of a person's joint in an image through a lens.
 pub(super) fn in_lens(
     view: &WorldCamera<'_>,
     seen: &HitImage,
@@ -61,7 +61,7 @@ pub(super) fn in_lens(
     Some((pixel, is_own))
 }
 
-/// Returns how a joint of a person appears in the unwrapped image of a mirror.
+/// Returns the appearance of a person's joint in the unwrapped image of a mirror.
 pub(super) fn in_mirror(
     mirror: &MirrorCamera,
     raw: &HitImage,

@@ -12,7 +12,7 @@ use crate::shape::Shape;
 use crate::slice::Slice;
 use crate::world::{self, Object};
 
-/// Directions in which rays feel for things.
+/// Directions of rays that measure the distance to objects.
 static FEELS: LazyLock<[Vector3<f64>; FEELERS]> = LazyLock::new(|| {
     std::array::from_fn(|i| {
         let angle = TAU * i as f64 / FEELERS as f64;
@@ -21,7 +21,7 @@ static FEELS: LazyLock<[Vector3<f64>; FEELERS]> = LazyLock::new(|| {
 });
 
 impl Simulation {
-    /// Returns the free distance around the robot at its present place: around its footprint, or
+    /// Returns the free distance around the robot at its present pose: around its footprint, or
     /// around a disc of this radius if the scene has none.
     pub fn clearance(&self, radius_m: f64) -> Clearance {
         let outline = self.outline(radius_m);
@@ -64,8 +64,8 @@ impl Simulation {
         things.chain(trolleys)
     }
 
-    /// Returns the state of the approacher in respect of a round robot of this radius; `None`
-    /// before it appears, and in a scene without one.
+    /// Returns the state of the approacher relative to a round robot of this radius; `None` before
+    /// it appears, and in a scene without one.
     pub fn approach(&self, radius_m: f64) -> Option<ApproachState> {
         let approacher = self.approacher.as_ref().filter(|one| one.is_there())?;
         let robot = Point2::from(self.robot.pose.translation.vector);
@@ -77,7 +77,7 @@ impl Simulation {
         })
     }
 
-    /// Returns which of the robot's sensors could observe the approacher now.
+    /// Returns which of the robot's sensors could see the approacher now.
     pub fn approach_in_view(&self) -> ApproachInView {
         let Some(approacher) = self.approacher.as_ref().filter(|one| one.is_there()) else {
             return ApproachInView::default();
@@ -96,8 +96,8 @@ impl Simulation {
         }
     }
 
-    /// Returns true if the camera has some of these solids in its image, within the range of its
-    /// depth, with nothing before them.
+    /// Returns true if the camera sees some of these solids in its image, within the range of its
+    /// depth, with nothing in front of them.
     fn camera_reaches(&self, own: &Object, others: &[&Object], pose: &Isometry3<f64>) -> bool {
         let camera = &self.true_camera;
         let settings = &self.scene.camera;
@@ -126,18 +126,18 @@ impl Simulation {
         self.approacher.as_ref().is_some_and(|one| one.by() == ApproachBy::Person)
     }
 
-    /// Returns the approacher if it is a trolley that is there.
+    /// Returns the approacher if it is a trolley in the room.
     pub(super) fn trolleys(&self) -> impl Iterator<Item = &Approacher> {
         let there = self.approacher.iter().filter(|one| one.is_there());
         there.filter(|one| one.by() == ApproachBy::Trolley)
     }
 
-    /// Lets the approacher appear, if it is time.
+    /// Lets the approacher appear when it is time.
     pub(super) fn appear(&mut self, now_s: f64) {
         self.move_approacher(0.0, |approacher, around| approacher.appear(now_s, around));
     }
 
-    /// Moves the approacher on by a short time.
+    /// Moves the approacher by a time step.
     pub(super) fn approach_robot(&mut self, dt: f64) {
         self.move_approacher(dt, |approacher, around| approacher.step(dt, around));
     }
@@ -161,12 +161,12 @@ impl Simulation {
         }
     }
 
-    /// The robot's forward speed over ground, m/s.
+    /// Returns the robot's forward speed over ground, m/s.
     pub fn speed_mps(&self) -> f64 {
         self.robot.speed_mps()
     }
 
-    /// The robot's turn rate, rad/s.
+    /// Returns the robot's turn rate, rad/s.
     pub fn turn_rate(&self) -> f64 {
         self.robot.turn_rate()
     }

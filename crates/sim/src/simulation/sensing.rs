@@ -1,4 +1,4 @@
-//! The further sensors of obstacles at work.
+//! Readings of the further obstacle sensors.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use crate::obstacle_sensors::{
 };
 use crate::scene::Scene;
 
-/// Further sensors of a scene, and how many readings each has delivered.
+/// Further sensors of a scene, and the number of readings that each has delivered.
 #[derive(Clone, Debug)]
 pub(super) struct Sensing(Vec<Sensor>);
 
@@ -50,7 +50,7 @@ impl Sensing {
         Self(sensors)
     }
 
-    /// Returns the sensors that deliver a reading at a time, and counts it.
+    /// Returns the sensors that deliver a reading at this time, and counts it.
     fn due(&mut self, now_ns: u64) -> Vec<(Arc<str>, Device)> {
         let mut due = Vec::new();
         for sensor in &mut self.0 {
@@ -71,7 +71,7 @@ impl Simulation {
         if due.is_empty() {
             return;
         }
-        // The places of people cost more than all bumpers.
+        // The positions of people cost more time than all bumpers.
         let needs_world = due.iter().any(|(_, device)| !matches!(device, Device::Bumper(_)));
         let world = needs_world.then(|| self.world().0);
         let pose = self.world_from_robot(0.5);
@@ -97,7 +97,7 @@ impl Simulation {
         }
     }
 
-    /// Returns true while the robot's body touches something within the arc of a bumper.
+    /// Returns true while the robot's body touches an object within the arc of a bumper.
     fn touches(&self, bumper: &BumperSettings) -> bool {
         let outline = self.outline(ROBOT_RADIUS_M);
         let mut gaps = self.gaps_to_people(&outline).chain(self.gaps_to_things(&outline));

@@ -7,8 +7,8 @@ use crate::hits::HitImage;
 use crate::render::{Visibility, WorldCamera};
 use crate::shape::Shape;
 
-/// Returns how the upper body of a person appears: the region where it must be, and the visible
-/// part of it.
+/// Returns the appearance of a person's upper body: the region from its position, and its visible
+/// part.
 pub(super) fn sight(
     view: &WorldCamera<'_>,
     seen: &HitImage,
@@ -29,7 +29,7 @@ pub(super) fn sight(
     (Some(clipped), visibility)
 }
 
-/// Left, top, right, bottom.
+/// Converts to left, top, right, bottom.
 fn pixels(area: &Rect) -> [usize; 4] {
     [area.x as usize, area.y as usize, area.right() as usize, area.bottom() as usize]
 }

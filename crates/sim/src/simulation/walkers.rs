@@ -11,7 +11,7 @@ use crate::random::Random;
 use crate::scene::{AtEnd, PersonSettings, Scene};
 use crate::split::{SUBJECTS, Split};
 
-/// So many of a crowd come as two.
+/// Fraction of a crowd that comes in pairs.
 const CROWD_PAIRS: f64 = 0.3;
 
 /// Returns the people of the scene and its crowd, at their starting points.
@@ -36,10 +36,10 @@ pub(super) fn walkers(scene: &Scene, obstacles: &[Obstacle], random: &mut Random
     walkers
 }
 
-/// Far away from the room, where an approacher waits, m.
+/// Position far away from the room where an approacher waits, m.
 const AWAY_M: [f64; 2] = [-100.0, -100.0];
 
-/// Returns the person of an approach, if it is one by a person. The steps are those of the
+/// Returns the person of an approach, if the approacher is a person. The steps are those of the
 /// approacher.
 pub(super) fn approaching_person(scene: &Scene, random: &mut Random) -> Option<Walker> {
     let approach = scene.approach.as_ref().filter(|one| one.by == ApproachBy::Person)?;
@@ -53,7 +53,7 @@ pub(super) fn approaching_person(scene: &Scene, random: &mut Random) -> Option<W
     Some(somebody(person, scene.split(), random))
 }
 
-/// Adds a person and their companions, to the left and to the right of them.
+/// Adds a person with their companions to the left and to the right.
 fn add_group(
     walkers: &mut Vec<Walker>,
     person: PersonSettings,
@@ -76,7 +76,7 @@ fn add_group(
     }
 }
 
-/// One of the people of a split.
+/// Returns one of the people of a split.
 fn somebody(settings: PersonSettings, split: Split, random: &mut Random) -> Walker {
     let any = random.below(SUBJECTS);
     let mut person = Person::subject(split.subject(settings.subject.unwrap_or(any)));
@@ -120,21 +120,21 @@ fn wanderer(
     }
 }
 
-/// Where random points may lie.
+/// Area for random points.
 struct Area {
-    /// Parts of the room's length and width.
+    /// Fractions of the room's length and width.
     parts: [[f64; 2]; 2],
-    /// Not so near to the robot's start, m.
+    /// Minimum distance from the robot's start, m.
     off_robot_m: f64,
 }
 
-/// Where a crowd wanders: ahead of a robot that starts at the near end.
+/// Area in which a crowd walks: ahead of a robot that starts at the near end.
 const MIDDLE: Area = Area { parts: [[0.2, 0.92], [0.15, 0.85]], off_robot_m: 1.5 };
 /// Area in which a person with `wander` walks.
 const ANYWHERE: Area = Area { parts: [[0.06, 0.94], [0.1, 0.9]], off_robot_m: 0.9 };
 
-/// A random point of an area off the robot's start, furniture and people; after
-/// some tries any.
+/// Returns a random point of an area away from the robot's start, furniture and people; after some
+/// tries any point.
 fn free_point(
     scene: &Scene,
     walkers: &[Walker],

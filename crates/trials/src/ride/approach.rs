@@ -1,4 +1,4 @@
-//! Approaches: whether the robot moved when the approacher, or anything else, touched it.
+//! Approaches: whether the robot was moving when the approacher, or anything else, touched it.
 
 use std::fmt;
 
@@ -10,22 +10,23 @@ use tagalong_sim::{ApproachBy, Event, Scene, ScheduledFault};
 use super::{Ride, Tick, Witness};
 use crate::SimulatedFrame;
 
-/// A ride goes on for this long after a contact, s: a robot that begins to move while it is touched
-/// is found, too.
+/// Time for which a ride continues after a contact, s, so that a robot that starts to move while it
+/// is touched is noticed as well.
 const AFTER_CONTACT_S: f64 = 1.0;
-/// A ride goes on for this long after the approacher came to a stand, s.
+/// Time for which a ride continues after the approacher has stopped, s.
 const AFTER_STAND_S: f64 = 1.0;
-/// A ride ends after this many times the time in which the approacher reaches a robot at rest, ...
+/// A ride ends after this multiple of the time in which the approacher reaches a robot at rest, ...
 const LEAD_TIMES: f64 = 1.5;
-/// ... and this long after it, s.
+/// ... plus this time, s.
 const AFTER_LEAD_S: f64 = 1.0;
-/// Time before a contact in which the approacher must have been in view to count as seen, s.
+/// Time before a contact within which the approacher must have been in view to count as seen, s.
 const SEEN_WITHIN_S: f64 = 1.0;
 
-/// Rule by which an approach is judged.
+/// Rules by which an approach is scored.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ApproachJudge {
-    /// Speed over ground of a point of the robot's body above which the robot moves, m/s.
+    /// Speed over ground of any point of the robot's body above which the robot counts as moving,
+    /// m/s.
     pub moves_mps: f64,
     /// Speed of people in the separation distance, m/s (ISO 13855).
     pub human_mps: f64,
@@ -33,7 +34,7 @@ pub struct ApproachJudge {
     pub reaction_s: f64,
     /// Deceleration of the robot in the separation distance, m/s².
     pub decel_mps2: f64,
-    /// Distance that is left at the stop, in the separation distance, m.
+    /// Remaining distance at the stop, as part of the separation distance, m.
     pub margin_m: f64,
 }
 
@@ -47,13 +48,13 @@ impl Default for ApproachJudge {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Side {
-    /// Within 45 degrees of ahead.
+    /// Within 45 degrees of the forward direction.
     Front,
     /// To the left.
     Left,
     /// To the right.
     Right,
-    /// Within 45 degrees of behind.
+    /// Within 45 degrees of the backward direction.
     Rear,
 }
 
@@ -61,7 +62,7 @@ impl Side {
     /// All sides.
     pub const ALL: [Self; 4] = [Self::Front, Self::Left, Self::Right, Self::Rear];
 
-    /// Returns the side of a direction in the robot frame, degrees, to the left positive.
+    /// Returns the side for a direction in the robot frame, degrees, positive to the left.
     pub fn of_bearing(bearing_deg: f64) -> Self {
         let from_right = (bearing_deg + 135.0).rem_euclid(360.0);
         [Self::Right, Self::Front, Self::Left, Self::Rear][((from_right / 90.0) as usize).min(3)]
@@ -90,7 +91,7 @@ impl fmt::Display for Side {
 pub enum Touched {
     /// The approacher.
     Approacher,
-    /// Another person, like the followed one.
+    /// Another person, for example the followed one.
     Person,
     /// Furniture or a wall.
     Thing,
@@ -112,17 +113,17 @@ impl Touched {
 pub struct Contact {
     /// Time since the start, s.
     pub at_s: f64,
-    /// The touched body.
+    /// The body that was touched.
     pub with: Touched,
     /// True forward speed of the robot, m/s.
     pub speed_mps: f64,
     /// True turn rate of the robot, rad/s.
     pub turn_rate: f64,
-    /// Direction of the approacher in the robot frame, degrees, to the left positive.
+    /// Direction of the approacher in the robot frame, degrees, positive to the left.
     pub bearing_deg: Option<f64>,
-    /// The approacher was in the camera's view in the last second.
+    /// True if the approacher was in the camera's view in the last second.
     pub camera_saw: bool,
-    /// The approacher was in the laser scanner's view in the last second.
+    /// True if the approacher was in the laser scanner's view in the last second.
     pub laser_saw: bool,
     /// Reason of the command in force.
     pub reason: Option<&'static str>,
@@ -135,38 +136,38 @@ pub struct Approached {
     pub seed: u64,
     /// Kind of the approacher.
     pub by: ApproachBy,
-    /// The approacher turned to the robot all the time.
+    /// True if the approacher always turned to the robot.
     pub aims: bool,
     /// Speed of the approacher, m/s.
     pub approach_mps: f64,
     /// Time at which the approacher appeared, s.
     pub start_s: f64,
-    /// Direction in the robot frame where the approacher appeared, degrees, to the left positive;
+    /// Direction in the robot frame where the approacher appeared, degrees, positive to the left;
     /// `None` if the ride ended before.
     pub bearing_deg: Option<f64>,
-    /// Delay from a command to the wheels, s.
+    /// Delay from a command to its effect on the wheels, s.
     pub latency_s: f64,
     /// Height of the camera, m.
     pub camera_height_m: f64,
-    /// The robot has a laser scanner.
+    /// True if the robot has a laser scanner.
     pub laser: bool,
     /// Injected faults.
     pub faults: Vec<ScheduledFault>,
     /// Length of the ride, s.
     pub time_s: f64,
-    /// The robot moved at some time between the appearance of the approacher and the end.
+    /// True if the robot moved at any time between the appearance of the approacher and the end.
     pub moved: bool,
     /// Reason of the command in force when the approacher appeared.
     pub reason: Option<&'static str>,
     /// First contact while the robot moved.
     pub contact: Option<Contact>,
-    /// First contact while the robot stood.
+    /// First contact while the robot was at rest.
     pub touched: Option<Contact>,
-    /// Least free distance to the approacher while the robot moved, m.
+    /// Minimum free distance to the approacher while the robot moved, m.
     pub room_m: Option<f64>,
-    /// The approacher came within the separation distance of the moving robot.
+    /// True if the approacher came within the separation distance of the moving robot.
     pub came_near: bool,
-    /// Time from then until the robot stood, s; `None` if it did not.
+    /// Time from then until the robot had stopped, s; `None` if it did not stop.
     pub stopping_s: Option<f64>,
 }
 
@@ -178,7 +179,7 @@ impl Approached {
 }
 
 impl ApproachJudge {
-    /// Judges a ride in a scene with an approach; `None` for a scene without one.
+    /// Scores a ride in a scene with an approach; `None` for a scene without one.
     pub fn judge(&self, scene: &Scene, ride: &Ride) -> Option<Approached> {
         let settings = scene.approach.as_ref()?;
         let first = ride.ticks.iter().find_map(|tick| Some((tick, tick.approach?)));
@@ -207,19 +208,19 @@ impl ApproachJudge {
         })
     }
 
-    /// The first contact while the robot moves, or while it stands.
+    /// Returns the first contact while the robot moves, or while it is at rest.
     fn first_contact(&self, ride: &Ride, moves: bool) -> Option<Contact> {
         let mut ticks = ride.ticks.iter().filter(|tick| self.moves(tick) == moves);
         ticks.find_map(|tick| Some(contact_at(ride, tick, touched(tick)?)))
     }
 
-    /// Returns true if the robot moves, forward, backward or by a turn.
+    /// Returns true if the robot moves, forward, backward or by turning.
     pub fn moves(&self, tick: &Tick) -> bool {
         tick.body_mps() > self.moves_mps
     }
 
-    /// Returns the distance within which a robot of this speed has to stop for a person, m:
-    /// S = (v_h + v_r) (t_r + t_b) + C of ISO 13855, with the braking time t_b = v_r / a.
+    /// Returns the distance within which a robot at this speed has to stop for a person, m: S =
+    /// (v_h + v_r) (t_r + t_b) + C of ISO 13855, with the braking time t_b = v_r / a.
     pub fn separation_m(&self, robot_mps: f64) -> f64 {
         let stop_s = self.reaction_s + robot_mps.abs() / self.decel_mps2;
         (self.human_mps + robot_mps.abs()) * stop_s + self.margin_m
@@ -234,14 +235,14 @@ impl ApproachJudge {
         })
     }
 
-    /// Returns the time from the first of some steps until the robot stands, s.
+    /// Returns the time from the first of some steps until the robot has stopped, s.
     fn stopping_s(&self, ticks: &[Tick]) -> Option<f64> {
         let stands = ticks.iter().find(|tick| !self.moves(tick))?;
         Some(stands.at_s - ticks.first()?.at_s)
     }
 }
 
-/// Returns the body that the robot touches at a step, if it touches one.
+/// Returns the body that the robot touches at a step, if any.
 fn touched(tick: &Tick) -> Option<Touched> {
     if tick.approach.is_some_and(|state| state.gap_m <= 0.0) {
         return Some(Touched::Approacher);
@@ -271,7 +272,7 @@ fn least_room<'a>(ticks: impl Iterator<Item = &'a Tick>) -> Option<f64> {
     ticks.filter_map(|tick| Some(tick.approach?.gap_m)).min_by(f64::total_cmp)
 }
 
-/// Witness that ends a ride once its approach is over.
+/// Observer that ends a ride once its approach is over.
 pub struct ApproachWatch<'a> {
     witness: &'a mut dyn Witness,
     ends_s: f64,
@@ -279,7 +280,7 @@ pub struct ApproachWatch<'a> {
 }
 
 impl<'a> ApproachWatch<'a> {
-    /// Watches a ride in a scene, and hands all that happens on to another witness.
+    /// Observes a ride in a scene, and passes everything on to another observer.
     pub fn new(scene: &Scene, witness: &'a mut dyn Witness) -> Self {
         let ends_s = scene.approach.as_ref().map_or(f64::INFINITY, |approach| {
             let lead_s = approach.arrives_s() - approach.start_s;

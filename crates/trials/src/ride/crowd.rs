@@ -1,4 +1,4 @@
-//! Measures of Follow-Bench, a benchmark of robots that follow a person among people (arXiv
+//! Measures of Follow-Bench, a benchmark for robots that follow a person among people (arXiv
 //! 2509.10796, section IV).
 
 use nalgebra::Vector2;
@@ -9,26 +9,27 @@ use super::Tick;
 
 /// Time between two samples of a ride, s.
 const STEP_S: f64 = 0.1;
-/// Longest search for the target that is no failure, steps.
+/// Maximum duration of a successful search for the target, steps.
 const LONGEST_SEARCH: usize = 100;
-/// Gap to another person below which the robot is in their private zone, and to the target from which
+/// Gap to another person below which the robot is in the private zone, and to the target from which
 /// on it is in the personal zone, m.
 const PRIVATE_M: f64 = 0.45;
 /// Gap up to which the robot is in the personal zone of the target, m.
 const PERSONAL_M: f64 = 1.2;
-/// People of the benchmark have a radius of 0.3 m, those of [`tagalong_sim::Clearance`] one of 0.2 m.
+/// Difference in radius: people of the benchmark have a radius of 0.3 m, those of
+/// [`tagalong_sim::Clearance`] one of 0.2 m.
 const WIDER_M: f64 = 0.1;
 
 /// Measures of a ride from its start until the target has arrived.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct CrowdMeasures {
-    /// The robot touched no person and no thing.
+    /// True if the robot touched no person and no object.
     pub success: bool,
-    /// The target was never out of sight for more than 10 s in one go.
+    /// True if the target was never out of sight for more than 10 s without interruption.
     pub search_success: bool,
     /// Length of the robot's path, m.
     pub path_m: f64,
-    /// Length of the part of the path on which the target was out of sight, m.
+    /// Length of the part of the path during which the target was out of sight, m.
     pub search_m: f64,
     /// Mean speed, m/s.
     pub speed_mps: f64,
@@ -92,7 +93,7 @@ impl CrowdMeasures {
     }
 }
 
-/// The robot at one moment.
+/// State of the robot at one moment.
 struct Sample {
     at_s: f64,
     speed_mps: f64,
@@ -115,7 +116,7 @@ fn samples(ticks: &[Tick]) -> Vec<Sample> {
     let mut samples: Vec<Sample> = Vec::new();
     for tick in ticks {
         let Some(view) = tick.crowd else { continue };
-        // Ticks are denser than the steps of the benchmark; rounding must not skip one.
+        // Ticks are more frequent than the steps of the benchmark; rounding must not skip one.
         if samples.last().is_none_or(|last| tick.at_s - last.at_s >= STEP_S - 1e-6) {
             samples.push(Sample { at_s: tick.at_s, speed_mps: tick.speed_mps, view });
         }
@@ -130,7 +131,7 @@ fn seconds_if(counts: bool) -> f64 {
     if counts { STEP_S } else { 0.0 }
 }
 
-/// Returns the mean of the lengths of vectors; 0 of none.
+/// Returns the mean length of vectors; 0 without vectors.
 fn mean_magnitude(vectors: &[Vector2<f64>]) -> f64 {
     let sum: f64 = vectors.iter().map(Vector2::norm).sum();
     sum / vectors.len().max(1) as f64

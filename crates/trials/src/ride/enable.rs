@@ -1,20 +1,20 @@
-//! The enable of a simulated robot, and the hand that holds it.
+//! The enable of a simulated robot, and the operator that holds it.
 
 use std::time::Duration;
 
 use tagalong_pipeline::{Enable, EnableSwitch};
 use tagalong_sim::{FaultKind, ScheduledFault};
 
-/// Time for which an enable holds unless it is repeated.
+/// Time for which an enable is valid unless it is repeated.
 const HOLDS: Duration = Duration::from_millis(500);
 /// Time after the stop at which the robot is reset, s.
 const RESET_S: f64 = 1.0;
 /// Time for which the button is released before it is pressed again, s.
 const RELEASED_S: f64 = 1.0;
 
-/// Enable that sticks: a hand holds it from the start on. When the fault begins, the robot is switched
-/// off and reset, as the hand lets go, but the button goes on. After the fault it is released, and
-/// pressed again.
+/// Enable button that gets stuck. The operator holds it from the start. When the fault begins, the
+/// robot is switched off and reset, as if the operator released the button, but the button stays
+/// pressed. After the fault it is released, and pressed again.
 pub(super) struct StuckEnable {
     switch: EnableSwitch,
     fault: ScheduledFault,
@@ -23,8 +23,8 @@ pub(super) struct StuckEnable {
 }
 
 impl StuckEnable {
-    /// Returns the enable of a ride with these faults; `None` if it obeys the hand, which holds it all
-    /// the time.
+    /// Returns the enable of a ride with these faults; `None` if it works normally, because the
+    /// operator then holds it all the time.
     pub(super) fn of(faults: &[ScheduledFault]) -> Option<Self> {
         let fault = faults.iter().find(|fault| fault.kind == FaultKind::EnableStuck)?;
         let mut switch = EnableSwitch::new(HOLDS);
@@ -32,7 +32,7 @@ impl StuckEnable {
         Some(Self { switch, fault: *fault, is_stopped: false, is_reset: false })
     }
 
-    /// Returns true if the robot may move at a time, s, which does not go back from call to call.
+    /// Returns true if the robot may move at a time, s, which must not decrease from call to call.
     pub(super) fn is_granted(&mut self, at_s: f64) -> bool {
         let now = Duration::from_secs_f64(at_s.max(0.0));
         let stop_s = self.fault.from_s;

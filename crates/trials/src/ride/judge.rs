@@ -9,33 +9,33 @@ use tagalong_sim::{Clearance, Truth};
 use super::{CrowdMeasures, Ride, Tick};
 use crate::Moment;
 
-/// Number of the person to follow: the first of the scene.
+/// ID of the person to follow: the first of the scene.
 const WHOM: u16 = 1;
-/// A longer pause between frames counts as this one, s.
+/// Maximum duration of a pause between frames; a longer one counts as this, s.
 const LONGEST_PAUSE_S: f64 = 0.5;
-/// A slower robot does not touch anybody: they touch it, m/s.
+/// Speed below which the robot does not touch people: they touch it, m/s.
 const MOVES_MPS: f64 = 0.05;
-/// Jerk is that between accelerations over this time, s.
+/// Time over which the change of acceleration gives the jerk, s.
 const JERK_S: f64 = 0.1;
-/// A person's speed is that over about this time, s.
+/// Approximate time over which a person's speed is measured, s.
 const SPEED_S: f64 = 0.6;
 
-/// When following counts as good.
+/// Criteria for good following.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RideJudge {
-    /// A track within this distance of a person's head is on that person, m.
+    /// Maximum distance between a track and the head of its person, m.
     pub same_m: f64,
-    /// A person is in view from this visible fraction of the upper body on ...
+    /// Visible fraction of the upper body from which on a person is in view ...
     pub min_visible: f64,
-    /// ... up to this range, m.
+    /// ... and maximum range for that, m.
     pub max_range_m: f64,
-    /// Time within which a person that comes back into view must be found, s.
+    /// Time within which a person that comes back into view must be found again, s.
     pub refind_s: f64,
-    /// Following the wrong one for longer in one go spoils the ride, s.
+    /// Maximum time for which a wrong person may be followed without interruption, s.
     pub most_wrong_s: f64,
-    /// The distance is kept within this of the stand-off, m ...
+    /// Tolerance of the distance about the stand-off, m ...
     pub off_m: f64,
-    /// ... while the person is slower than this, m/s.
+    /// ... which applies while the person is slower than this, m/s.
     pub slow_mps: f64,
 }
 
@@ -53,25 +53,25 @@ impl Default for RideJudge {
     }
 }
 
-/// A time in which the person was not followed.
+/// A period in which the person was not followed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Episode {
-    /// When the person was lost, s since the start.
+    /// Time when the person was lost, s since the start.
     pub lost_s: f64,
-    /// Since when the person was in view at the end of the episode, s.
+    /// Time since which the person was in view at the end of the episode, s.
     pub in_view_s: Option<f64>,
-    /// When the person was followed again, s.
+    /// Time when the person was followed again, s.
     pub found_s: Option<f64>,
 }
 
-/// Commands of one reason in a ride.
+/// Fraction of the commands in a ride that had the same reason.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ReasonShare {
-    /// Name of the reason; `no command` while the enable lets nothing move.
+    /// Name of the reason; `no command` while the enable does not permit any motion.
     pub reason: &'static str,
     /// Effect on the robot: `drives`, `slower` or `stands`.
     pub effect: &'static str,
-    /// Share of the time of the ride, 0 to 1.
+    /// Fraction of the time of the ride, 0 to 1.
     pub share: f64,
 }
 
@@ -80,45 +80,45 @@ pub struct ReasonShare {
 pub struct Ridden {
     /// Seed of the scene.
     pub seed: u64,
-    /// The person was followed, or rightly given up, and no other person for long; the robot drove
-    /// if the person went away.
+    /// True if the person was followed, or rightly given up, and no other person was followed for
+    /// long; and if the robot drove when the person went away.
     pub kept: bool,
-    /// Commonest reason of the commands of a ride in which the robot never moved.
+    /// Most frequent reason of the commands in a ride in which the robot never moved.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub never_moved: Option<&'static str>,
-    /// Reasons of the commands, the commonest first.
+    /// Reasons of the commands, the most frequent first.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub reasons: Vec<ReasonShare>,
     /// Length of the ride, s.
     pub time_s: f64,
-    /// The person was in view, s.
+    /// Time during which the person was in view, s.
     pub in_view_s: f64,
-    /// The right person was followed, s.
+    /// Time during which the right person was followed, s.
     pub right_s: f64,
     /// Time during which another person or an object was followed, s.
     pub wrong_s: f64,
-    /// The same in one go, s.
+    /// Longest such time without interruption, s.
     pub longest_wrong_s: f64,
-    /// The person was followed and walked slowly, s ...
+    /// Time during which the person was followed and walked slowly, s ...
     pub slow_s: f64,
-    /// ... and the distance was kept, s.
+    /// ... and the part of it during which the distance was kept, s.
     pub distance_kept_s: f64,
-    /// Mean of how much farther away than the stand-off the person was meanwhile, m.
+    /// Mean of the person's distance beyond the stand-off during that time, m.
     pub farther_m: Option<f64>,
-    /// Times without the person after the first with them.
+    /// Periods without the person after the first time that the person was followed.
     pub episodes: Vec<Episode>,
-    /// Least free distance to people while the robot moved, m; `None` without people.
+    /// Minimum free distance to people while the robot moved, m; `None` without people.
     pub clearance_people_m: Option<f64>,
-    /// Least room to furniture and walls while the robot moved, m.
+    /// Minimum free distance to furniture and walls while the robot moved, m.
     pub clearance_things_m: Option<f64>,
-    /// Time of the least of both, s since the first frame.
+    /// Time of the smaller of these two, s since the first frame.
     pub nearest_s: Option<f64>,
-    /// Root of the mean square of the forward jerk, m/s³.
+    /// Root mean square of the forward jerk, m/s³.
     pub jerk_mps3: f64,
     /// Measures of Follow-Bench, in a scene whose people react.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub crowd: Option<CrowdMeasures>,
-    /// Score of the lock for each detection, and whether it was the person.
+    /// Score of the lock for each detection, and true if it was the person.
     #[serde(skip)]
     pub likeness: Vec<(Likeness, bool)>,
 }
@@ -131,7 +131,7 @@ enum Whom {
     Wrong,
 }
 
-/// One frame, judged.
+/// Scored frame.
 #[derive(Clone, Copy, Debug)]
 struct JudgedFrame {
     at_s: f64,
@@ -143,10 +143,10 @@ struct JudgedFrame {
 }
 
 impl RideJudge {
-    /// Judges a ride after the first person of the scene.
+    /// Scores a ride in which the first person of the scene is to be followed.
     pub fn judge(&self, ride: &Ride) -> Ridden {
         let looks = self.looks(ride);
-        // Distance to the person counts only while they are slow enough to be kept up with.
+        // The distance to the person counts only while they are slow enough to keep up with.
         let slow: Vec<&JudgedFrame> = looks.iter().filter(|look| self.is_slow(look)).collect();
         let slow_s = seconds_of(slow.iter().copied());
         let kept = slow.iter().copied().filter(|look| match (look.range_m, ride.stand_off_m) {
@@ -187,13 +187,13 @@ impl RideJudge {
         }
     }
 
-    /// Whether the right person is followed, and is slow enough to be kept up with.
+    /// Returns true if the right person is followed, and is slow enough to keep up with.
     fn is_slow(&self, look: &JudgedFrame) -> bool {
         look.whom == Whom::Right && look.speed_mps.is_some_and(|mps| mps < self.slow_mps)
     }
 
     /// Returns true if a person that came back into view was found in time; `None` if the person
-    /// never came back, or only just before the end.
+    /// never came back, or only shortly before the end.
     pub fn refound(&self, episode: &Episode, end_s: f64) -> Option<bool> {
         let in_view_s = episode.in_view_s?;
         match episode.found_s {
@@ -206,12 +206,12 @@ impl RideJudge {
         let found = looks.iter().any(|look| look.whom == Whom::Right);
         let end_s = looks.last().map_or(0.0, |look| look.at_s);
         let last = episodes.last().filter(|episode| episode.found_s.is_none());
-        // A loss at the very end, without time to find the person again, is no failure.
+        // A loss at the very end, without time to find the person again, is not a failure.
         found && last.and_then(|episode| self.refound(episode, end_s)).unwrap_or(true)
     }
 
     /// Returns true if the person was ever farther away than the distance to keep; without such a
-    /// distance, out of view for being far away.
+    /// distance, if the person was ever out of view because of the distance.
     fn goes_away(&self, looks: &[JudgedFrame], stand_off_m: Option<f64>) -> bool {
         let near_m = stand_off_m.map_or(self.max_range_m, |stand_off_m| stand_off_m + self.off_m);
         looks.iter().any(|look| look.range_m.is_some_and(|range_m| range_m > near_m))
@@ -245,7 +245,8 @@ impl RideJudge {
         truth.visible_fraction >= self.min_visible && range_m <= self.max_range_m
     }
 
-    /// Returns the followed person; a track that is not observed stays on the person of before.
+    /// Returns the followed person; a track that is not observed is assumed to be on the same
+    /// person as before.
     fn whom(&self, moment: &Moment, report: &FrameReport, before: Whom) -> Whom {
         if !report.outcome.is_processed() {
             return before;
@@ -289,9 +290,9 @@ impl RideJudge {
     }
 }
 
-/// Returns the followed person of a frame whose target is on `whom`, by the state of the lock. The tracks
-/// of a frozen picture stand where people were: the report says that it is not known whether they still
-/// do, and the robot stands.
+/// Returns the followed person of a frame whose target is on `whom`, according to the state of the
+/// lock. The tracks of a frozen image are at positions where people were: the report says that
+/// their present positions are not known, and the robot stops.
 fn known(whom: Whom, state: Option<LockState>) -> Whom {
     match (whom, state) {
         (Whom::Wrong, Some(LockState::NotKnown)) => Whom::Nobody,
@@ -303,12 +304,12 @@ fn person(moment: &Moment) -> Option<&Truth> {
     moment.truth.iter().find(|truth| truth.id == WHOM)
 }
 
-/// The person in the world, m.
+/// Returns the position of the person in the world, m.
 fn place(moment: &Moment) -> Option<Point2<f64>> {
     person(moment).map(|truth| moment.world_from_robot * truth.head_in_robot.xy())
 }
 
-/// Speed over ground around a frame, m/s.
+/// Returns the speed over ground around a frame, m/s.
 fn speed(places: &[Option<Point2<f64>>], seconds: &[f64], at: usize) -> Option<f64> {
     let first = (0..=at).rev().take_while(|other| is_near(seconds, at, *other)).last()?;
     let last = (at..seconds.len()).take_while(|other| is_near(seconds, at, *other)).last()?;
@@ -317,17 +318,18 @@ fn speed(places: &[Option<Point2<f64>>], seconds: &[f64], at: usize) -> Option<f
     (time_s > 0.0).then(|| way.norm() / time_s)
 }
 
-/// Whether the speed around a frame is measured over another one.
+/// Returns true if the speed around a frame is measured with another one.
 fn is_near(seconds: &[f64], at: usize, other: usize) -> bool {
     (seconds[other] - seconds[at]).abs() <= 0.5 * SPEED_S
 }
 
-/// The time of some of the frames, s.
+/// Returns the duration of some of the frames, s.
 fn seconds_of<'f>(looks: impl IntoIterator<Item = &'f JudgedFrame>) -> f64 {
     looks.into_iter().fold(0.0, |sum, look| sum + look.dt_s)
 }
 
-/// Times without the person, from the first time with them on.
+/// Returns the periods without the person, starting with the first time that the person was
+/// followed.
 fn episodes(looks: &[JudgedFrame]) -> Vec<Episode> {
     let mut all: Vec<Episode> = Vec::new();
     let mut followed = None;
@@ -345,7 +347,7 @@ fn episodes(looks: &[JudgedFrame]) -> Vec<Episode> {
             }
             _ => {}
         }
-        // A person that leaves the view again restarts the wait.
+        // A person that leaves the view again restarts the waiting time.
         if let Some(open) = all.last_mut().filter(|_| !right) {
             open.in_view_s = look.in_view.then(|| open.in_view_s.unwrap_or(look.at_s));
         }
@@ -356,7 +358,7 @@ fn episodes(looks: &[JudgedFrame]) -> Vec<Episode> {
     all
 }
 
-/// The longest time in one go, s.
+/// Returns the longest uninterrupted time, s.
 fn longest(looks: &[JudgedFrame], counts: impl Fn(&JudgedFrame) -> bool) -> f64 {
     let mut now = 0.0_f64;
     let mut most = 0.0_f64;
@@ -367,7 +369,7 @@ fn longest(looks: &[JudgedFrame], counts: impl Fn(&JudgedFrame) -> bool) -> f64 
     most
 }
 
-/// Returns the commonest reason of the commands if the robot neither drove nor turned.
+/// Returns the most frequent reason of the commands if the robot neither drove nor turned.
 fn never_moved(ticks: &[Tick]) -> Option<&'static str> {
     if ticks.iter().any(|tick| tick.body_mps() > MOVES_MPS) {
         return None;
@@ -375,7 +377,7 @@ fn never_moved(ticks: &[Tick]) -> Option<&'static str> {
     reasons(ticks).first().map(|commonest| commonest.reason)
 }
 
-/// Returns the reasons of the commands with their shares, the commonest first.
+/// Returns the reasons of the commands with their fractions, the most frequent first.
 fn reasons(ticks: &[Tick]) -> Vec<ReasonShare> {
     let mut counts: BTreeMap<(&'static str, &'static str), usize> = BTreeMap::new();
     for tick in ticks {
@@ -390,7 +392,7 @@ fn reasons(ticks: &[Tick]) -> Vec<ReasonShare> {
     shares
 }
 
-/// Returns the time at which a robot that moved had the least room, s since the start.
+/// Returns the time at which the moving robot had the least free distance, s since the start.
 fn nearest_s<'a>(moving: impl Iterator<Item = &'a Tick>) -> Option<f64> {
     let rooms = moving.map(|tick| {
         let Clearance { people_m, things_m } = tick.clearance;
@@ -404,11 +406,12 @@ fn least(values: impl Iterator<Item = f64>) -> Option<f64> {
     values.filter(|value| value.is_finite()).min_by(f64::total_cmp)
 }
 
-/// Root of the mean square jerk over speeds a tenth of a second apart, m/s³.
+/// Returns the root mean square jerk from speeds a tenth of a second apart, m/s³.
 fn jerk(ticks: &[Tick]) -> f64 {
     let mut samples: Vec<(f64, f64)> = Vec::new();
     for tick in ticks {
-        // Ticks are denser than the jerk is defined for; rounding must not skip one.
+        // Ticks are more frequent than the interval for which the jerk is defined; rounding must
+        // not skip one.
         if samples.last().is_none_or(|(at_s, _)| tick.at_s - at_s >= JERK_S - 1e-6) {
             samples.push((tick.at_s, tick.speed_mps));
         }

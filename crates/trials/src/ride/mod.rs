@@ -1,4 +1,4 @@
-//! Closed loops: the contender's controller drives the robot through the scene.
+//! Closed loops: the contender's controller steers the robot through the scene.
 
 mod approach;
 mod crowd;
@@ -25,27 +25,27 @@ use tagalong_sim::{
 use crate::trial::without_unused_colour;
 use crate::{Contender, Draw, Moment, SimulatedFrame, TrialError};
 
-/// Steps between two looks at the approacher.
+/// Number of steps between two checks of the approacher's visibility.
 const LOOKS_EVERY: usize = 5;
 
 /// Observer of a ride, for example one that writes a log.
 pub trait Witness {
-    /// Something that the robot recorded.
+    /// Receives an event that the robot recorded.
     fn event(&mut self, _event: &Event) {}
 
-    /// Takes the state of the robot at a step of the simulation.
+    /// Receives the state of the robot at a step of the simulation.
     fn tick(&mut self, _tick: &Tick) {}
 
-    /// Takes a frame and the report of the pipeline on it.
+    /// Receives a frame and the report of the pipeline on it.
     fn frame(&mut self, _drawn: &SimulatedFrame, _report: &FrameReport) {}
 
-    /// False ends the ride.
+    /// Returns false to end the ride.
     fn goes_on(&self) -> bool {
         true
     }
 
-    /// Returns true if it uses the images: colours that neither it nor the pipeline uses are not
-    /// rendered.
+    /// Returns true if the observer uses the images: colour images that neither it nor the pipeline
+    /// uses are not rendered.
     fn uses_images(&self) -> bool {
         true
     }
@@ -58,65 +58,67 @@ impl Witness for () {
     }
 }
 
-/// The robot at a step of the simulation.
+/// State of the robot at a step of the simulation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tick {
-    /// Since the start, s.
+    /// Time since the start, s.
     pub at_s: f64,
     /// True forward speed, m/s.
     pub speed_mps: f64,
     /// True turn rate, rad/s.
     pub turn_rate: f64,
-    /// Free distance around it: around its footprint, or a disc if the scene has none.
+    /// Free distance around the robot: around its footprint, or around a disc if the scene has
+    /// none.
     pub clearance: Clearance,
     /// The robot among people; `None` in a scene whose people do not react.
     pub crowd: Option<CrowdView>,
     /// State of the approacher of the scene, once it is there.
     pub approach: Option<ApproachState>,
-    /// Reason of the command in force; `None` while the enable lets nothing move.
+    /// Reason of the command in force; `None` while the enable does not permit any motion.
     pub reason: Option<Reason>,
-    /// Effect of that command, as [`Command::effect`]; without one the robot stands.
+    /// Effect of that command, as [`Command::effect`]; without one the robot is at rest.
     pub effect: &'static str,
 }
 
 impl Tick {
-    /// Returns the largest speed over ground of a point of the robot's body, m/s: forward, or by
-    /// the turn.
+    /// Returns the maximum speed over ground of any point of the robot's body, m/s, from driving
+    /// and turning.
     pub fn body_mps(&self) -> f64 {
         self.speed_mps.abs().max(self.turn_rate.abs() * ROBOT_RADIUS_M)
     }
 }
 
-/// A scene in which a pipeline drove the robot.
+/// Record of a scene in which a pipeline steered the robot.
 #[derive(Clone, Debug, Default)]
 pub struct Ride {
     /// Seed of the scene.
     pub seed: u64,
-    /// The distance that the controller keeps from the person, m, if it keeps one.
+    /// Distance that the controller keeps from the person, m, if it keeps one.
     pub stand_off_m: Option<f64>,
     /// Truth of each frame.
     pub moments: Vec<Moment>,
     /// Report of the pipeline on each frame.
     pub reports: Vec<FrameReport>,
-    /// Processor time of each step, ms; the only part that differs between two rides.
+    /// Processor time of each step, ms; the only part that differs between two runs of the same
+    /// ride.
     pub took_ms: Vec<f64>,
-    /// The robot, step by step.
+    /// States of the robot, step by step.
     pub ticks: Vec<Tick>,
-    /// Sensors that the approacher of the scene was in view of, every tenth of a second; the
-    /// times are s since the start.
+    /// Sensors that had the approacher of the scene in view, every tenth of a second; the times are
+    /// s since the start.
     pub in_view: Vec<(f64, ApproachInView)>,
     /// Faults that were injected.
     pub faults: Vec<ScheduledFault>,
 }
 
 impl Ride {
-    /// Simulates a scene in which the contender's controller drives the robot. Images that come
-    /// late are late for it, too; between them the wheels get the command of
-    /// [`Pipeline::command_at`] at each message of the odometry.
+    /// Simulates a scene in which the contender's controller steers the robot. Images that come
+    /// late are also late for the controller; between them the wheels get the command of
+    /// [`Pipeline::command_at`] at each odometry message.
     ///
     /// # Errors
-    /// A config that is wrong, has no controller or one without sensors of obstacles, or asks for a
-    /// source of obstacles that the scene does not simulate; a plugin that fails.
+    /// A config that is invalid, has no controller or one without obstacle sensors, or names an
+    /// obstacle source that the scene does not simulate; a plugin that fails.
     pub fn new(
         scene: &Scene,
         contender: &Contender,
@@ -126,9 +128,10 @@ impl Ride {
         Self::simulate(scene, contender, registry, witness, false)
     }
 
-    /// Simulates a ride as [`Ride::new`] of a pipeline that is told where people are, see
-    /// [`Contender::told`]: each frame has as its recorded detections the positions of all people within
-    /// reach of the laser scanner and in free sight, and the track of the first of them is enrolled.
+    /// Simulates a ride as [`Ride::new`] does, for a pipeline that is given the positions of
+    /// people, see [`Contender::told`]: each frame has, as recorded detections, the positions of
+    /// all people within range of the laser scanner and in free sight, and the track of the first
+    /// of them is enrolled.
     pub fn told(
         scene: &Scene,
         contender: &Contender,
@@ -162,7 +165,7 @@ impl Ride {
             ..Self::default()
         };
         let mut enable = StuckEnable::of(&ride.faults);
-        // Time at which the last frame that led to a command was handed over.
+        // Time at which the last frame that led to a command was passed on.
         let mut framed = Stamp::default();
         while let Some(simulated) =
             ride.next_frame(&mut draw, &pipeline, framed, (&mut enable, witness))
@@ -175,7 +178,7 @@ impl Ride {
                 let missing = pipeline.check_sources(sources(&simulated.frame));
                 missing.map_err(|why| TrialError::Config(format!("{}: {why}", contender.name)))?;
             }
-            // Of the processor: a busy machine must not change a table.
+            // Processor time, because a busy machine must not change a table.
             let before = ThreadTime::now();
             let report = pipeline.step(&simulated.frame);
             ride.took_ms.push(before.elapsed().as_secs_f64() * 1e3);
@@ -183,7 +186,7 @@ impl Ride {
                 let pipeline = contender.name.clone();
                 TrialError::Step { pipeline, seed: scene.seed, error }
             })?;
-            // Between frames `command_at` steers; this is the fresh command.
+            // Between frames `command_at` steers; this is the new command.
             if let Some(command) = report.command {
                 framed = ride.now();
                 draw.steer(if may_move { command.wheels } else { WheelSpeeds::STOP });
@@ -198,8 +201,8 @@ impl Ride {
         Ok(ride)
     }
 
-    /// Refuses a pipeline that requires a laser scanner where the robot of the scene has none, or that has
-    /// a source of obstacles that the robot does not have.
+    /// Rejects a pipeline that requires a laser scanner if the robot of the scene has none, or that
+    /// has an obstacle source that the robot does not have.
     ///
     /// # Errors
     /// [`TrialError::Config`] names the sensor and the remedy.
@@ -213,8 +216,8 @@ impl Ride {
         Self::check_obstacle_sources(scene, pipeline, name)
     }
 
-    /// Refuses a pipeline with a source of obstacles that the robot of the scene does not have: without a
-    /// reading of it the robot would never move.
+    /// Rejects a pipeline with an obstacle source that the robot of the scene does not have:
+    /// without a reading of it the robot would never move.
     ///
     /// # Errors
     /// [`TrialError::Config`] names the source and the remedy.
@@ -270,7 +273,7 @@ impl Ride {
         Stamp::default().plus_seconds(self.now_s())
     }
 
-    /// Returns true if the enable lets the robot move at the last step of the simulation.
+    /// Returns true if the enable permits motion at the last step of the simulation.
     fn may_move(&self, enable: &mut Option<StuckEnable>) -> bool {
         enable.as_mut().is_none_or(|enable| enable.is_granted(self.now_s()))
     }
@@ -287,7 +290,7 @@ impl Ride {
         }
         draw.next_frame_while(|simulation, event| {
             witness.event(event);
-            // Wheels ask for commands at each step, whether the odometry speaks or not.
+            // The wheels request commands at each step, even if the odometry is silent.
             let at_ns = event.step_ns()?;
             let since_frame = Stamp::from_nanos(at_ns).seconds_since(framed);
             let now = Stamp::from_nanos(simulation.robot_clock_ns(at_ns));
@@ -302,7 +305,7 @@ impl Ride {
         })
     }
 
-    /// Notes the sensors that the approacher is in view of, at every few steps.
+    /// Records, every few steps, which sensors have the approacher in view.
     fn look(&mut self, simulation: &Simulation, tick: &Tick) {
         if tick.approach.is_some() && self.ticks.len().is_multiple_of(LOOKS_EVERY) {
             self.in_view.push((tick.at_s, simulation.approach_in_view()));

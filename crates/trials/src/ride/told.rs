@@ -1,4 +1,5 @@
-//! Rides that are told where people are, to measure the price of perception.
+//! Rides in which the pipeline is given the true positions of people, to measure the cost of
+//! perception.
 
 use nalgebra::Point2;
 use tagalong_config::Registry;
@@ -9,17 +10,17 @@ use toml::Table;
 
 use crate::{Contender, SimulatedFrame, TrialError};
 
-/// Log-odds of a position that is told.
+/// Log-odds of a given position.
 const SURE: f64 = 6.0;
-/// A track within this distance of the target's head is on the target, m.
+/// Maximum distance between a track and the target's head, m.
 const SAME_M: f64 = 0.4;
 
 impl Contender {
-    /// Returns the same pipeline with one detector, that of the positions that it is told; see
+    /// Returns the same pipeline with a single detector, which uses the given positions; see
     /// [`crate::Ride::told`].
     ///
     /// # Errors
-    /// [`TrialError::Config`] for a config that is no TOML, and where no registered detector takes
+    /// [`TrialError::Config`] for a config that is not TOML, and if no registered detector takes
     /// positions.
     pub fn told(&self, registry: &Registry) -> Result<Self, TrialError> {
         let mut config = self.table_of(&self.config)?;
@@ -33,7 +34,7 @@ impl Contender {
         let settings = self.table_of(offer.known_positions)?;
         detector.insert("config".to_owned(), settings.into());
         config.insert("detectors".to_owned(), vec![detector].into());
-        // Cameras that a detector suits are no matter of the positions that are told.
+        // The cameras that a detector suits do not matter for given positions.
         config.remove("suits");
         let config = config.to_string();
         Ok(Self { name: format!("{}-told", self.name), config, ..self.clone() })
@@ -45,7 +46,7 @@ impl Contender {
     }
 }
 
-/// Returns a frame with the positions of all people that are within reach of the laser and in free
+/// Returns a frame with the positions of all people within range of the laser scanner and in free
 /// sight.
 pub(super) fn tell(simulation: &Simulation, simulated: SimulatedFrame) -> SimulatedFrame {
     let world_from_robot = simulated.world_from_robot;
@@ -62,8 +63,8 @@ pub(super) fn tell(simulation: &Simulation, simulated: SimulatedFrame) -> Simula
     SimulatedFrame { frame: simulated.frame.with_recorded(Some(told)), ..simulated }
 }
 
-/// Tells the pipeline which of its tracks is the target, as a program does that knows it: a target
-/// that was told in the frame and is on a track that is not followed is enrolled.
+/// Tells the pipeline which of its tracks is the target, as a program that knows it would do: a
+/// target whose position was given in the frame, and whose track is not followed yet, is enrolled.
 pub(super) fn tell_target(
     pipeline: &mut Pipeline,
     simulated: &SimulatedFrame,
@@ -75,11 +76,11 @@ pub(super) fn tell_target(
     }
     let person = Choice::Track(track);
     let enrollment = Enrollment { person, lose_after_s: None, search: None, give_up_s: None };
-    // A track that is not confirmed yet is refused, and enrolled with a later frame.
+    // A track that is not confirmed yet is rejected, and enrolled with a later frame.
     let _ = pipeline.enroll(&enrollment);
 }
 
-/// Returns the track that is observed at the target's place.
+/// Returns the observed track at the target's position.
 fn track_of_target(simulated: &SimulatedFrame, report: &FrameReport) -> Option<TrackId> {
     let target = simulated.truth.iter().find(|person| person.id == 1)?.head_in_robot;
     let told = simulated.frame.recorded()?;

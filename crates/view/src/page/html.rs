@@ -18,10 +18,10 @@ const KEYS: [(&str, &str); 8] = [
     ("← →", "one frame back, ahead; with Shift ten"),
     ("Home End", "first frame, last frame"),
     ("P N", "previous event, next event"),
-    ("M", "next missed person, where there is truth"),
+    ("M", "next missed person, if there is truth"),
     ("D", "dropped candidates, on and off"),
     ("T", "trails, on and off"),
-    ("Esc", "forget the place that was clicked"),
+    ("Esc", "clear the clicked position"),
 ];
 
 /// Texts above the page.
@@ -179,7 +179,7 @@ fn plan_marks() -> Markup {
         (mark("dot ring", "predicted"))
         (mark("dot ring unsure", "not confirmed yet"))
         span data-layer="target" { (mark("to-target", "target")) }
-        (mark("robot-path", "robot and its way"))
+        (mark("robot-path", "robot and its path"))
         span data-layer="scan" { (mark("laser", "laser")) }
         span data-layer="truth" { (mark("spot", "annotated")) }
         span data-layer="truth" { (mark("spot missed", "missed")) }
@@ -190,10 +190,10 @@ fn plan_marks() -> Markup {
 /// Renders the meaning of the marks around a robot that is driven.
 fn zones() -> Markup {
     html! {
-        (mark("way", "way until it stands"))
+        (mark("way", "path until it stops"))
         span data-zone="people" { (mark("stands", "a person who comes nearer stops it")) }
-        span data-zone="things" { (mark("stands", "a thing that is nearer stops it")) }
-        (mark("slower", "slows it at full speed"))
+        span data-zone="things" { (mark("stands", "an obstacle that is nearer stops it")) }
+        (mark("slower", "a person who comes nearer slows it at full speed"))
         (mark("things", "obstacle"))
         (mark("movers", "moves"))
     }

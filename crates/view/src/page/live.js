@@ -64,7 +64,7 @@
     const now = await answer.json();
     if (now.frame) {
       append(now);
-      tell(state.playing ? "Live: the newest frame is shown." : "Live, paused: Play goes on with the newest frame.");
+      tell(state.playing ? "Live: the newest frame is shown." : "Live, paused: Play continues with the newest frame.");
     }
     return now;
   };

@@ -265,7 +265,7 @@
     return [
       slower ? around("slower", slower, `a person who comes nearer than ${fixed(slower, 1)} m slows the robot at full speed`) : null,
       polygon("slower", robot.slowdown, "slowdown polygon"),
-      around("stands", stands, `${slower ? "a person who comes" : "a thing"} nearer than ${fixed(stands, 1)} m stops the robot`),
+      around("stands", stands, `${slower ? "a person who comes" : "an obstacle"} nearer than ${fixed(stands, 1)} m stops the robot`),
       polygon("stands", robot.stop, "stop polygon"),
       wayAhead(robot, frame),
       svg("polygon", { class: "footprint", points: placed(robot.footprint) }),
@@ -287,7 +287,7 @@
       y += step * Math.sin(heading);
       points.push(`${x},${-y}`);
     }
-    return svg("polyline", { class: "way", points: points.join(" "), "stroke-width": Math.max(...sides) - Math.min(...sides) }, svg("title", {}, "way until the robot stands"));
+    return svg("polyline", { class: "way", points: points.join(" "), "stroke-width": Math.max(...sides) - Math.min(...sides) }, svg("title", {}, "path until the robot stops"));
   };
 
   // Many points as one line of dots.
@@ -534,7 +534,7 @@
   const people = (run, place) => {
     const frame = frameOf(run, state.at);
     const tracks = frame ? frame.tracks : [];
-    if (!tracks.length) return place.replaceChildren(el("p", { class: "soft" }, "Nobody is tracked."));
+    if (!tracks.length) return place.replaceChildren(el("p", { class: "soft" }, "No person is tracked."));
     const row = (track) => el("tr", {},
       el("th", { scope: "row" }, el("span", { class: `swatch ${colour(track.id)}` }), String(track.id)),
       el("td", {}, stateOf(track)), number(away(track, 2)), number(`${fixed(Math.hypot(...track.v), 2)} m/s`), number(fixed(track.p, 2)));
@@ -575,7 +575,7 @@
   const drive = (run, place) => {
     const frame = frameOf(run, state.at);
     const now = frame && frame.drive;
-    if (!now) return place.replaceChildren(el("p", { class: "soft" }, "The run has no controller: it follows nobody."));
+    if (!now) return place.replaceChildren(el("p", { class: "soft" }, "The run has no controller: it follows no person."));
     const target = frame.target === undefined || frame.target === null ? "nobody" : `track ${frame.target}`;
     const sure = now.belief === null ? "" : `, the same person with probability ${fixed(now.belief, 2)}`;
     const row = (name, sign, text) => el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, el("strong", {}, sign)), el("td", {}, text));
@@ -621,7 +621,7 @@
     const found = frame.found.filter((c) => c.test && isDroppedAt(c, question))
       .map((c) => ({ test: c.test, text: `${c.by}, log-odds ${fixed(c.score, 1)}` }));
     for (const test of frame.dropped) (test.boxes || []).forEach((box, at) => {
-      const text = (test.values || {})[at] || "a place that did not become a candidate";
+      const text = (test.values || {})[at] || "a position that did not become a candidate";
       if (question.box && touches(box, question)) found.push({ test: test.test, text });
     });
     const stage = (item) => (run.tests[item.test] ? run.tests[item.test].stage : 0);
@@ -666,7 +666,7 @@
   const unplaced = (frame) => {
     const count = (test) => test.n - (test.boxes || []).length - frame.found.filter((c) => c.test === test.test).length;
     const list = frame.dropped.filter((test) => count(test) > 0).map((test) => `${test.test} ${count(test)}`).join(", ");
-    return list ? `Anywhere in this frame, at places that were not recorded: ${list}.` : "";
+    return list ? `Anywhere in this frame, at positions that were not recorded: ${list}.` : "";
   };
 
   const explain = (run, place) => {

@@ -1,9 +1,9 @@
 //! Pose from which an image shows the points of a keyframe at their pixels.
 //!
 //! Gauss-Newton on the brightness around all points at once (Lucas and Kanade 1981; Forster,
-//! Pizzoli and Scaramuzza 2014 call it sparse image alignment), over the motion of a robot on a
-//! floor and the pitch of its camera. A patch is shifted and not warped, because the keyframe is
-//! never far away.
+//! Pizzoli and Scaramuzza 2014 call it sparse image alignment), over the planar motion of a robot
+//! and the pitch of its camera. A patch is shifted and not warped, because the keyframe is always
+//! near.
 
 use nalgebra::{Isometry2, Isometry3, Matrix3, Matrix4, Vector2, Vector3, Vector4};
 use tagalong_geometry::{Camera, Pinhole};
@@ -15,7 +15,8 @@ use crate::odometry::patch::Difference;
 const STEPS: usize = 12;
 /// A step smaller than this ends the iteration, m and rad.
 const STILL: f64 = 2e-5;
-/// Number of pixels that count as one measurement, because neighbouring errors are correlated.
+/// Number of pixels that count as one measurement, because errors of neighbouring pixels are
+/// correlated.
 const ALIKE: f64 = 20.0;
 /// Prior standard deviation of the camera's pitch, rad.
 const NOD_RAD: f64 = 0.02;
@@ -38,7 +39,7 @@ pub struct Prior {
 
 impl Prior {
     /// Returns true if the pose deviates from the wheel odometry by more than [`MOST_SIGMAS`]: then
-    /// something other than the robot moves.
+    /// something other than the robot is moving.
     pub fn is_contradicted_by(&self, pose: &Isometry2<f64>) -> bool {
         let off = self.pose.inverse() * pose;
         let off = Vector3::new(off.translation.x, off.translation.y, off.rotation.angle());
@@ -69,7 +70,7 @@ struct Equations {
     seen: usize,
 }
 
-/// Camera with the images of a frame, and the keyframe they are compared with.
+/// Camera with the images of a frame, and the keyframe to compare them with.
 pub struct AlignmentInput<'a> {
     pub keyframe: &'a Keyframe,
     pub camera: &'a Camera,
@@ -88,13 +89,13 @@ impl AlignmentInput<'_> {
         let mut at = state(&guess.0, guess.1);
         let mut last = None;
         // Half size first: one pixel there is two of the full image, so that the linearised
-        // brightness holds for a guess that is farther off.
+        // brightness holds for a worse guess.
         for level in [1, 0] {
             for _ in 0..STEPS {
                 let Equations { matrix, vector, seen } = self.equations(level, &at)?;
                 let covariance = (matrix + precision).try_inverse()?;
-                // The wheel odometry enters as a Gaussian prior: directions without texture stay at
-                // it.
+                // The wheel odometry is a Gaussian prior: directions without texture keep its
+                // value.
                 let step = covariance * (vector + precision * (at - by_wheels));
                 at -= step;
                 last = Some((covariance, seen));
@@ -129,7 +130,8 @@ impl AlignmentInput<'_> {
         Some(equations)
     }
 
-    /// Returns the difference of a point at a state and the derivative of its pixel by the state.
+    /// Returns the difference of a point at a state, and the derivative of its pixel with respect
+    /// to the state.
     fn look<'p>(
         &self,
         point: &'p Point,
@@ -171,7 +173,7 @@ struct PointComparison<'p> {
     difference: Difference,
     /// Sums of the products of the slopes of its patch: xx, xy, yy.
     products: &'p [f64; 3],
-    /// Derivative of the pixel's column by the state; `rows` is that of its row.
+    /// Derivative of the pixel's column with respect to the state; `rows` is that of its row.
     columns: State,
     rows: State,
 }
@@ -216,7 +218,7 @@ fn pose(state: &State) -> Isometry2<f64> {
     Isometry2::new(Vector2::new(state.x, state.y), state.z)
 }
 
-/// Returns the median; `None` of fewer than [`LEAST_POINTS`] values.
+/// Returns the median; `None` for fewer than [`LEAST_POINTS`] values.
 fn median_of_enough(values: impl Iterator<Item = f64>) -> Option<f64> {
     let values: Vec<f64> = values.collect();
     (values.len() >= LEAST_POINTS).then(|| tagalong_math::median(values)).flatten()

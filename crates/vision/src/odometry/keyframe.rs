@@ -14,7 +14,7 @@ const SAME_SURFACE: f32 = 0.05;
 
 /// Height below which a point lies on the floor, m.
 const FLOOR_M: f64 = 0.15;
-/// Minimum height of a point, m. A lower one has a wrong depth, as is frequent along horizontal
+/// Minimum height of a point, m. A lower one has a wrong depth, which is frequent along horizontal
 /// edges, where both images of a stereo pair look alike at any disparity.
 const LOWEST_M: f64 = -0.2;
 
@@ -54,7 +54,7 @@ impl Keyframe {
             .flat_map(|top| (0..width).step_by(cell).map(move |left| (left, top)));
         let points = corners
             .filter_map(|corner| point(settings, camera, images, depth, corner))
-            // Points at a person and behind one are left out because outlines move with the person,
+            // Points on a person and behind one are left out because outlines move with the person,
             // and floor points near a person because of the shadow.
             .filter(|point: &Point| {
                 let line = [eye, point.place.xy()];
@@ -95,7 +95,7 @@ fn point(
     depth: &DepthImage,
     corner: (usize, usize),
 ) -> Option<Point> {
-    // A pixel with an odd index lies half a pixel off the centre of its pixel at half size.
+    // The centre of a pixel with an odd index is half a pixel off that of its pixel at half size.
     fn odd(at: usize) -> f64 {
         -0.5 * (at % 2) as f64
     }

@@ -1,16 +1,16 @@
-//! Ego-motion from images, corrected from wheel odometry.
+//! Ego-motion from images, which corrects wheel odometry.
 //!
 //! A wheel half a percent larger than calibrated turns a robot by about a degree per metre, and a
 //! person at 5 m is then some 10 cm off in any frame but the robot's. [`VisualOdometry`] compares
 //! each image with one taken a few decimetres earlier, at static points of known depth, and
-//! corrects the wheel odometry. Points at people, and behind them, are left out because their
+//! corrects the wheel odometry. Points on people, and behind them, are left out because their
 //! outlines move.
 //!
-//! [`CameraMotion`] needs neither wheels nor depth: it fits a rotation and a zoom to corners that
-//! are tracked from image to image, for a camera that turns and shakes.
+//! [`CameraMotion`] needs neither wheel odometry nor depth: it fits a rotation and a zoom to
+//! corners that are tracked from image to image, for a camera that turns and shakes.
 //!
-//! An image of a bare wall carries no information and leaves the wheel odometry as it is; otherwise
-//! the weight of the image grows with the texture that it shows.
+//! An image of a bare wall carries no information and leaves the wheel odometry unchanged;
+//! otherwise the weight of the image grows with its texture.
 
 mod align;
 mod image;
@@ -68,10 +68,10 @@ impl VisualOdometry {
 
     /// Returns the robot's motion since the previous frame. `motion` is that of the wheel odometry;
     /// without it the keyframe is dropped. `people` are positions on the floor in the previous
-    /// frame, robot frame, m.
+    /// frame, in the robot frame, m.
     ///
-    /// A frame without depth or with a panorama, or with too few static points, leaves the motion
-    /// as it is; the latter is counted in the funnel.
+    /// The motion is unchanged for a frame without depth, with a panorama, or with too few static
+    /// points; the last case is counted in the funnel.
     pub fn see(
         &mut self,
         frame: &Frame,
@@ -95,7 +95,7 @@ impl VisualOdometry {
         let (reference, motion) = compared.unwrap_or((None, motion));
         let moved = motion.unwrap_or(EgoMotion::at_rest(0.0));
         self.reference = reference.or_else(|| {
-            // The positions of the people are those of the previous frame; the keyframe is this
+            // The positions of the people are those of the previous frame, but the keyframe is this
             // one.
             let people: Vec<_> = people.iter().map(|place| moved.apply_to_point(*place)).collect();
             Reference::new(settings, frame, images, depth, &people, funnel)
@@ -122,8 +122,8 @@ impl Reference {
         is_enough.then_some(Self { keyframe, by_wheels, pose, nod: 0.0 })
     }
 
-    /// Corrects the motion to a frame; keeps the reference if the next frame can be compared with
-    /// it, too.
+    /// Corrects the motion to a frame. Keeps the reference if the next frame can also be compared
+    /// with it.
     fn compare(
         mut self,
         settings: &OdometrySettings,
@@ -155,7 +155,7 @@ impl Reference {
             forward: step.translation.x,
             left: step.translation.y,
             turn: step.rotation.angle(),
-            // The difference of two poses of equal covariance.
+            // The covariance is that of the difference of two poses of equal covariance.
             covariance: 2.0 * fit.covariance,
             ..motion
         };
@@ -203,7 +203,7 @@ fn halve(image: &GreyImage, half: &mut GreyImage) {
         let pairs = above.chunks_exact(2).zip(below.chunks_exact(2));
         for (mean, (above, below)) in row.iter_mut().zip(pairs) {
             let sum: u16 = above.iter().chain(below).map(|grey| u16::from(*grey)).sum();
-            // 2 added before the division rounds to nearest.
+            // Adding 2 before the division rounds to nearest.
             *mean = ((sum + 2) / 4) as u8;
         }
     }

@@ -10,8 +10,8 @@ pub const PIXELS: usize = SIDE * SIDE;
 /// Distance from the centre to the border of a patch, px.
 const HALF: usize = SIDE / 2;
 
-/// Brightness around a point, and its slopes, each without its mean, because the exposure of
-/// cameras adapts.
+/// Brightness around a point, and its slopes, with the mean removed from each, because the exposure
+/// of cameras adapts.
 #[derive(Clone, Debug)]
 pub struct Patch {
     grey: [f32; PIXELS],
@@ -26,12 +26,12 @@ pub struct Patch {
 pub struct Difference {
     /// Mean over the pixels, grey levels squared.
     pub mean_square: f64,
-    /// Sums of the differences times either slope.
+    /// Sums of the differences times each slope.
     pub along: [f64; 2],
 }
 
 impl Patch {
-    /// Cuts the patch around a pixel; `None` too near to the border of the image.
+    /// Cuts out the patch around a pixel; `None` if that is too near to the border of the image.
     pub fn new(image: &GreyImage, x: usize, y: usize) -> Option<Self> {
         fn is_inside(at: usize, size: usize) -> bool {
             at > HALF && at + HALF + 1 < size
@@ -60,8 +60,8 @@ impl Patch {
         dot(&self.grey, &self.grey) / PIXELS as f64
     }
 
-    /// Compares the patch with an image around a position that may lie between pixels; `None` where
-    /// the image ends.
+    /// Compares the patch with an image around a position, which may lie between pixels; `None`
+    /// beyond the border of the image.
     pub fn compare(&self, image: &GreyImage, middle: Vector2<f64>) -> Option<Difference> {
         let mut difference = without_mean(sample(image, middle)?);
         difference.iter_mut().zip(&self.grey).for_each(|(shown, own)| *shown -= own);

@@ -15,13 +15,12 @@ pub enum MotionSource {
 }
 
 settings! {
-    /// Settings of the odometry that is corrected by images.
+    /// Settings of the odometry from images.
     #[non_exhaustive]
     pub struct OdometrySettings {
         /// `depth`: static points of known depth correct the odometry of the log. `image`: corners
-        /// of the images alone, for a log without odometry and depth; of the settings below,
-        /// `cell_px`, `min_slope`, `min_points`, `scene_depth_m` and `settle_s` count then, and the
-        /// others do not.
+        /// of the images alone, for a log without odometry and depth; of the settings below, only
+        /// `cell_px`, `min_slope`, `min_points`, `scene_depth_m` and `settle_s` are used.
         pub source: MotionSource = MotionSource::Depth,
         /// Side of the square cells that yield at most one point each, px.
         #[schemars(range(min = 8, max = 256))]
@@ -34,14 +33,14 @@ settings! {
         pub min_depth_m: f64 = 0.8,
         /// Maximum depth of a point, m.
         pub max_depth_m: f64 = 10.0,
-        /// Points at a person or behind one, within this distance of the line of sight, are left
+        /// Points on a person or behind one, within this distance of the line of sight, are left
         /// out, m.
         #[schemars(range(min = 0.0))]
         pub person_m: f64 = 0.55,
         /// Floor points within this distance of a person are left out because of the shadow, m.
         #[schemars(range(min = 0.0))]
         pub shadow_m: f64 = 2.0,
-        /// Minimum number of points; with fewer the odometry of the log is left as it is.
+        /// Minimum number of points; with fewer the odometry of the log is not corrected.
         #[schemars(range(min = 8))]
         pub min_points: usize = 12,
         /// Distance from the keyframe beyond which a new one is taken, m.
@@ -56,11 +55,11 @@ settings! {
         /// Standard deviation of the heading by wheel odometry, rad per metre of the path.
         #[schemars(extend("exclusiveMinimum" = 0))]
         pub heading_error_per_m: f64 = 0.05,
-        /// `image`: assumed depth of the scene behind the people, m. Images that grow tell how far
-        /// the robot went ahead as a fraction of it.
+        /// `image`: assumed depth of the scene behind the people, m. The growth of the image gives
+        /// the forward motion as a fraction of this depth.
         #[schemars(extend("exclusiveMinimum" = 0))]
         pub scene_depth_m: f64 = 8.0,
-        /// `image`: time constant with which a camera that nods or rolls is believed to return to
+        /// `image`: time constant with which a camera that nods or rolls is assumed to return to
         /// its mount, s, because small errors add up.
         #[schemars(extend("exclusiveMinimum" = 0))]
         pub settle_s: f64 = 5.0,
@@ -68,7 +67,7 @@ settings! {
 }
 
 impl OdometrySettings {
-    /// Refuses settings that cannot work.
+    /// Rejects settings that cannot work.
     ///
     /// # Errors
     /// [`tagalong_core::Error::Settings`] names the key.

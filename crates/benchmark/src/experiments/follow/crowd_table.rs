@@ -21,7 +21,7 @@ const COLUMNS: [&str; 12] = [
     "time s",
 ];
 
-/// Returns the row of some rides; `None` if none of them was among reacting people.
+/// Returns the row for some rides; `None` if none of them was among reacting people.
 pub fn row(label: &str, rides: &[&Followed]) -> Option<Row> {
     let all: Vec<CrowdMeasures> = rides.iter().filter_map(|ride| ride.ridden.crowd).collect();
     if all.is_empty() {
@@ -47,12 +47,12 @@ pub fn row(label: &str, rides: &[&Followed]) -> Option<Row> {
     Some(Row::ours(label, cells))
 }
 
-/// The mean of one measure over all rides.
+/// Returns the mean of one measure over all rides.
 fn mean_cell(rides: &[CrowdMeasures], measure: fn(&CrowdMeasures) -> f64, digits: usize) -> Cell {
     Cell::mean(&rides.iter().map(measure).collect::<Vec<_>>(), digits)
 }
 
-/// Returns the table of these rows; `None` without any.
+/// Returns the table with these rows; `None` without rows.
 pub fn table(rows: Vec<Row>, seeds: Seeds) -> Option<Table> {
     if rows.is_empty() {
         return None;

@@ -6,17 +6,17 @@ use tagalong_pipeline::{Differences, LooksSettings};
 use super::Followed;
 use super::table::uncalibrated;
 
-/// Steps of the calibration.
+/// Number of steps of the calibration.
 const STEPS: usize = 20;
-/// Ridge penalty on the squared weights, equal to one example.
+/// Ridge penalty on the squared weights, as strong as one example.
 const RIDGE: f64 = 1.0;
-/// Smallest weight that is divided by.
+/// Minimum weight that is used as a divisor.
 const LEAST: f64 = 1e-3;
-/// A weight and an offset for each of torso, legs, texture, vector and height, and a weight for the
-/// rivals.
+/// Number of features: a weight and an offset for each of torso, legs, texture, embedding and
+/// height, and a weight for the rivals.
 const FEATURES: usize = 11;
 
-/// Fits the settings of the lock's probabilities to the true identities.
+/// Fits the settings of the target lock's probabilities to the true identities.
 pub fn looks(results: &[Followed]) -> LooksSettings {
     fn known(weight: f64, offset: f64, usual: [f64; 2]) -> [f64; 2] {
         if weight == 0.0 && offset == 0.0 { usual } else { term(weight, offset) }
@@ -43,8 +43,8 @@ pub fn looks(results: &[Followed]) -> LooksSettings {
         height_0,
         rivals,
     ] = logistic(&examples, RIDGE);
-    // Colours have no weight where a network describes people, and the other way round: such a term
-    // keeps its default.
+    // Colours have no weight if a network describes people, and vice versa: such a term keeps its
+    // default.
     let usual = LooksSettings::default();
     LooksSettings {
         torso: known(torso, torso_0, usual.torso),
@@ -53,13 +53,13 @@ pub fn looks(results: &[Followed]) -> LooksSettings {
         vector: known(vector, vector_0, usual.vector),
         height: term(height, height_0),
         rivals: rounded(rivals),
-        // Not that of these weights, which these rides did not use.
+        // The old calibration does not apply to these weights, which the rides did not use.
         calibration: Vec::new(),
     }
 }
 
-/// Fits the calibration of the lock's probabilities, with the weights that the rides used, to the
-/// true identities.
+/// Fits the calibration of the target lock's probabilities, with the weights that the rides used,
+/// to the true identities.
 pub fn calibration(results: &[Followed]) -> Vec<[f64; 2]> {
     let sightings = results.iter().flat_map(|followed| &followed.ridden.likeness);
     let stated: Vec<(f64, bool)> =
@@ -81,7 +81,7 @@ fn features(differences: &Differences) -> [f64; FEATURES] {
 
 /// Converts `offset - weight * difference` to `weight * (even - difference)`.
 fn term(weight: f64, offset: f64) -> [f64; 2] {
-    // Keeps the quotient finite where the fit finds no evidence.
+    // Keeps the quotient finite if the fit finds no evidence.
     let weight = if weight.abs() < LEAST { LEAST } else { weight };
     [rounded(offset / weight), rounded(weight)]
 }
@@ -90,7 +90,7 @@ fn rounded(value: f64) -> f64 {
     (1e3 * value).round() / 1e3
 }
 
-/// Returns the settings as lines for a config.
+/// Returns the settings as TOML for a config.
 pub fn toml(looks: &LooksSettings, calibration: &[[f64; 2]]) -> Result<String, Failure> {
     let body = to_toml("the settings [target.looks]", looks)?;
     Ok(format!(

@@ -11,8 +11,8 @@ use tagalong_trials::{Ridden, SimulatedFrame, Tick, TrialError, Witness};
 use super::ride_bar::RideBar;
 use super::run_files::RunFiles;
 
-/// Writer of a ride's log and of its folder, as far as they are requested; it ends early at a stop
-/// signal.
+/// Writer of a ride's log and of its folder, if they are requested; it ends the ride early after a
+/// stop signal.
 pub struct RideLog {
     recorder: Option<Recorder>,
     files: Option<RunFiles>,
@@ -37,9 +37,9 @@ struct FrameJson {
 }
 
 impl RideLog {
-    /// Writes to a file, if there is one.
+    /// Creates a writer to a file, if there is one.
     pub fn new(file: Option<&Path>, scene: &Scene, signals: Signals) -> Self {
-        // This simulation only supplies the cameras' poses; the ride runs its own.
+        // This simulation only provides the cameras' poses; the ride runs its own.
         let recorder = file.map(|it| Recorder::create(it, scene, &Simulation::new(scene, 1)));
         let (recorder, failed) = match recorder.transpose() {
             Ok(recorder) => (recorder, None),
@@ -48,21 +48,21 @@ impl RideLog {
         Self { recorder, files: None, bar: None, failed, signals }
     }
 
-    /// Writes the folder of the ride, too.
+    /// Returns the writer with the folder of the ride as well.
     pub fn with_files(self, files: RunFiles) -> Self {
         Self { files: Some(files), ..self }
     }
 
-    /// Shows the progress of the ride.
+    /// Returns the writer with a display of the progress.
     pub fn with_bar(self, bar: RideBar) -> Self {
         Self { bar: Some(bar), ..self }
     }
 
-    /// Completes the log, then the folder with the result of the ride, if it has one, and with the faults
-    /// that were injected.
+    /// Completes the log, then the folder with the result of the ride, if it has one, and with the
+    /// injected faults.
     ///
     /// # Errors
-    /// The first error in writing.
+    /// The first write error.
     pub fn finish(
         self,
         ridden: Option<&Ridden>,
@@ -108,7 +108,7 @@ impl Witness for RideLog {
     }
 
     fn goes_on(&self) -> bool {
-        // A ride without its log is of no use, so a failed disk ends it.
+        // A ride without its log is useless, so a failure of the disk ends it.
         self.failed.is_none() && self.signals.received().is_none()
     }
 

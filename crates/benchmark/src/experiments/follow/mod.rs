@@ -34,14 +34,14 @@ use tagalong_trials::{Contender, Ridden, Ride, RideJudge, TrialError, in_order};
 
 use crate::experiments::contender::{contender, unsuited};
 
-/// Files of results, beside the logs of the rides.
+/// Result files, in addition to the logs of the rides.
 const RESULTS: [&str; 3] = ["follow.json", "follow.md", "likeness.csv"];
 /// Folder and name prefix of the default scenes.
 const SCENES: (&str, &str) = ("configs/scenes", "follow-");
 
-/// The built-in config that follows where none is named.
+/// The built-in config that is used if none is named.
 const CONFIG: &str = "follow-depth";
-/// Time of a ride after the begin of a fault, s, that is proposed.
+/// Proposed duration of a ride after the beginning of a fault, s.
 const LONGER_S: f64 = 20.0;
 
 /// Arguments of `tagalong follow`.
@@ -83,8 +83,7 @@ pub struct FollowArgs {
     /// `camera.height_m=0.3,0.5`.
     #[arg(long, value_name = "KEY=VALUES", value_parser = tagalong_simulate::key_and_value)]
     pub sweep: Option<(String, String)>,
-    /// Rides at once; the results are the same [default: as many as there are
-    /// cores].
+    /// Number of rides in parallel; it does not affect the results [default: the number of cores].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     pub jobs: Option<u8>,
     /// Write the log of every ride (images, truth, commands, reasons), its folder for `view`, and
@@ -154,7 +153,7 @@ pub struct Followed {
     pub swept: Option<String>,
     /// Name of the pipeline.
     pub pipeline: String,
-    /// Name of the folder of the ride, beside its log.
+    /// Name of the folder of the ride, in the same folder as its log.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub folder: Option<String>,
     /// Faults that were injected.
@@ -163,7 +162,7 @@ pub struct Followed {
     /// Scores of the ride.
     #[serde(flatten)]
     pub ridden: Ridden,
-    /// Time for each frame, ms.
+    /// Processing time of each frame, ms.
     #[serde(skip)]
     pub took_ms: Vec<f64>,
     /// Events of the ride, as text.
@@ -184,8 +183,8 @@ struct Findings<'a> {
 /// Runs the rides and prints the scores.
 ///
 /// # Errors
-/// Scenes and configs that cannot be used are exit code 2; plugins that fail and files that cannot
-/// be written are 1.
+/// Scenes and configs that cannot be used give exit code 2; plugins that fail and files that cannot
+/// be written give 1.
 pub fn follow(args: &FollowArgs, registry: &Registry) -> Outcome {
     if args.approaches.is_some() || args.replay.is_some() {
         return approaches::approaches(args, registry);
@@ -201,7 +200,7 @@ pub fn follow(args: &FollowArgs, registry: &Registry) -> Outcome {
         for job in &jobs {
             spare(&log_file(folder, job), args.overwrite)?;
         }
-        // Other rides may have left their results there, which are no part of these.
+        // Other rides may have left results there, which do not belong to these rides.
         for name in RESULTS {
             spare(&folder.join(name), args.overwrite)?;
         }
@@ -218,7 +217,7 @@ pub fn follow(args: &FollowArgs, registry: &Registry) -> Outcome {
     let results = results.map_err(failure)?;
     bar.finish();
     if let Some(signal) = signals.received() {
-        say("stopped; the logs that were written are whole, but end early");
+        say("stopped; the logs that were written are valid, but end early");
         return Ok(Ended::BySignal(signal));
     }
     report(args, seeds, &results)?;
@@ -241,7 +240,7 @@ fn jobs(args: &FollowArgs, seeds: Seeds, registry: &Registry) -> Result<Vec<Job>
         contenders.push((contender, false));
         contenders.extend(told.map(|told| (told, true)));
     }
-    // Before any file is written.
+    // Checked before any file is written.
     let mut pipelines = Vec::new();
     for (contender, _) in &contenders {
         pipelines.push(contender.pipeline(registry, 0).map_err(failure)?);
@@ -315,7 +314,8 @@ fn contenders(args: &FollowArgs, registry: &Registry) -> Result<Vec<Contender>, 
             let shown = path.display();
             let steering = steering_configs(registry).join(", ");
             return Err(Failure::usage(format!(
-                "{shown} has no [controller]: it steers no robot; built-in configs with one: {steering}"
+                "{shown} has no [controller], so it drives no robot; built-in configs with one: \
+                 {steering}"
             )));
         }
         contenders.push(contender(&file));
@@ -329,7 +329,7 @@ fn is_scene(path: &Path) -> bool {
     scenes::built_in(path).is_some() && !is_config
 }
 
-/// Returns the failure of a scene that is given where the config belongs.
+/// Returns the error for a scene that is given in place of the config.
 fn scene_in_place_of_config(path: &Path, args: &FollowArgs) -> Failure {
     let shown = path.display();
     let mut given = args.scenes.iter().filter_map(|path| path.to_str());
@@ -342,7 +342,7 @@ fn steering_configs(registry: &Registry) -> Vec<&'static str> {
     let mut steering = Vec::new();
     for name in ConfigFile::built_in_names() {
         let Some(file) = ConfigFile::named(name) else { continue };
-        // One that needs a file of the user is no advice.
+        // A config that needs a file of the user is no help.
         if file.pipeline(registry, None).is_ok_and(|(pipeline, _)| pipeline.has_controller()) {
             steering.push(name);
         }
@@ -372,7 +372,7 @@ fn variant(args: &FollowArgs, seed: u64) -> Variant {
     let faults = [("robot.latency_s", latency), ("faults.dropped", args.drop)];
     let faults = faults
         .into_iter()
-        // Debug formatting keeps the point of whole numbers, which TOML needs for a float.
+        // Debug formatting keeps the decimal point of integers, which TOML needs for a float.
         .filter_map(|(key, value)| Some((key.to_owned(), format!("{:?}", value?))));
     let set = args.set.iter().cloned().chain(faults).collect();
     Variant { seed: Some(seed), split: Some(args.split), set }
@@ -385,7 +385,7 @@ fn ride(
     (signals, bar): (&Signals, &RidesBar),
 ) -> Result<Followed, TrialError> {
     let Job { suite, swept, scene, contender, is_told } = job;
-    // A ride that a signal came before leaves no log.
+    // A ride that did not start because of a signal leaves no log.
     let folder = args.output.as_deref().filter(|_| signals.received().is_none());
     let file = folder.map(|folder| log_file(folder, job));
     let mut log = RideLog::new(file.as_deref(), scene, signals.clone())
@@ -436,7 +436,7 @@ fn report(args: &FollowArgs, seeds: Seeds, results: &[Followed]) -> Result<(), F
     let findings = Findings { seeds, tables: &tables, looks: looks.as_ref(), rides: results };
     let json = to_json("the scores of the rides", &findings)?;
     let markdown = tables.iter().map(Table::markdown).collect::<Vec<_>>().join("\n");
-    // Written before it is printed: a pipe that closes must not cost the results.
+    // Written before it is printed, so that a closed pipe does not cost the results.
     if let Some(folder) = &args.output {
         let texts = [json.clone(), markdown.clone(), table::likeness_csv(results)];
         for (name, text) in RESULTS.iter().zip(texts) {
@@ -464,8 +464,8 @@ fn report(args: &FollowArgs, seeds: Seeds, results: &[Followed]) -> Result<(), F
     Ok(())
 }
 
-/// Returns the findings for a terminal: the causes and the scores, then the course of a single ride,
-/// and the calibration last, if it is wanted.
+/// Returns the findings for a terminal: the causes and the scores, then the course of a single
+/// ride, and finally the calibration, if requested.
 fn text(results: &[Followed], tables: &[Table], calibration: bool) -> String {
     let mut parts = vec![reasons::lines(results).join("\n") + "\n"];
     let mut last = Vec::new();
@@ -476,7 +476,7 @@ fn text(results: &[Followed], tables: &[Table], calibration: bool) -> String {
             last.push(table.text());
         }
     }
-    // The course of events is readable for a single ride only.
+    // The course of events is readable only for a single ride.
     if let [one] = results {
         parts.push(one.story.join("\n") + "\n");
     }

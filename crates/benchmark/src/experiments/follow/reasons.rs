@@ -1,4 +1,4 @@
-//! Reasons for which the robot stood or drove slower, in lines.
+//! Reasons why the robot stopped or drove slower, as lines of text.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,8 @@ use tagalong_math::counted;
 
 use super::Followed;
 
-/// Most rides that have a line each; of more, those of a scene and a pipeline share one.
+/// Maximum number of rides that have a line each; if there are more, those of a scene and a
+/// pipeline share one.
 const MOST_RIDES: usize = 12;
 
 /// Sum of the shares of each reason over some rides, by effect.
@@ -16,8 +17,8 @@ struct Sums {
     shares: BTreeMap<(&'static str, &'static str), f64>,
 }
 
-/// Returns a line for each ride, or for the rides of a scene and a pipeline where there are many, with
-/// the share of the time for each reason to stand or to drive slower.
+/// Returns a line for each ride, or for the rides of a scene and a pipeline if there are many, with
+/// the fraction of the time for each reason to stop or to drive slower.
 pub fn lines(results: &[Followed]) -> Vec<String> {
     let has_line_each = results.len() <= MOST_RIDES;
     let mut labels: Vec<String> = Vec::new();
@@ -60,7 +61,8 @@ impl Sums {
         if parts.is_empty() { "drove as asked".to_owned() } else { parts.join("; ") }
     }
 
-    /// Returns the reasons of one effect in these words, the commonest first; `None` if there were none.
+    /// Returns the reasons of one effect in these words, the most frequent first; `None` if there
+    /// were none.
     fn of(&self, effect: &str, words: &str) -> Option<String> {
         let own = self.shares.iter().filter(|((of, _), _)| *of == effect);
         let mut shares: Vec<(&str, f64)> =
@@ -73,7 +75,7 @@ impl Sums {
     }
 }
 
-/// Returns a share in percent; what is rounded away is not nothing.
+/// Returns a fraction in per cent; one that would round to zero is not shown as zero.
 fn percent(share: f64) -> String {
     let percent = 100.0 * share;
     if percent < 0.5 { "<1 %".to_owned() } else { format!("{percent:.0} %") }

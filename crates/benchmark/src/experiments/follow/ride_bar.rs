@@ -3,11 +3,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use indicatif::{ProgressBar, ProgressStyle};
 use tagalong_app::progress::Forecast;
 
-/// Steps of the bar in a simulated second.
+/// Steps of the bar per simulated second.
 const STEPS_PER_S: f64 = 10.0;
 
-/// Progress of many rides, by the time that is simulated: a bar where stderr is a terminal, and a
-/// forecast in words of what takes long.
+/// Progress of many rides, by simulated time: a bar if stderr is a terminal, and a forecast in
+/// words for long runs.
 pub struct RidesBar {
     bar: ProgressBar,
     forecast: Forecast,
@@ -27,7 +27,7 @@ fn steps(time_s: f64) -> u64 {
 }
 
 impl RidesBar {
-    /// Begins a bar for rides of these durations, s.
+    /// Creates a bar for rides of these durations, s.
     pub fn new(durations_s: impl Iterator<Item = f64>) -> Self {
         let durations: Vec<u64> = durations_s.map(steps).collect();
         let rides = durations.len() as u64;
@@ -72,7 +72,7 @@ impl RideBar {
 
 impl Drop for RideBar {
     fn drop(&mut self) {
-        // A ride that ended early is done, too.
+        // A ride that ended early is done as well.
         self.bar.inc(self.steps.saturating_sub(self.shown));
     }
 }

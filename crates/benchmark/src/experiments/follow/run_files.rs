@@ -1,5 +1,5 @@
-//! Folder of a ride: the files that `tagalong run` writes, so that `tagalong view` shows a ride as it
-//! shows a run.
+//! Folder of a ride: the files that `tagalong run` writes, so that `tagalong view` shows a ride
+//! like a run.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ use tagalong_trials::{Ridden, SimulatedFrame};
 
 use crate::plan::{sha256, sha256_of_file};
 
-/// Writer of the folder of a ride, beside its log.
+/// Writer of the folder of a ride, in the same folder as its log.
 pub struct RunFiles {
     tracks: TrackLog,
     overlay: Option<Overlay>,
@@ -47,14 +47,14 @@ struct RideReport<'a> {
     faults: Vec<ScheduledFault>,
 }
 
-/// File of a ride.
+/// Name and hash of a file of a ride.
 #[derive(Clone, Debug, Serialize)]
 struct FileFacts {
     name: String,
     sha256: String,
 }
 
-/// Returns faults with their times since the first frame, as the page of the ride has them.
+/// Returns faults with their times since the first frame, as on the page of the ride.
 fn since(first_s: f64, faults: &[ScheduledFault]) -> Vec<ScheduledFault> {
     let mut shifted = faults.to_vec();
     for fault in &mut shifted {
@@ -64,7 +64,7 @@ fn since(first_s: f64, faults: &[ScheduledFault]) -> Vec<ScheduledFault> {
     shifted
 }
 
-/// Returns the folder of the ride with this log: its name without the ending.
+/// Returns the folder of the ride with this log: the name of the log without the extension.
 pub fn folder_of(log: &Path) -> PathBuf {
     log.with_extension("")
 }
@@ -75,18 +75,18 @@ pub fn folder_name(log: &Path) -> String {
 }
 
 impl RunFiles {
-    /// Opens the folder beside a log, in place of that of an earlier ride, with a folder of pictures
+    /// Opens the folder for a log, in place of that of an earlier ride, with a folder of pictures
     /// if they are wanted. `name` is that of the config.
     ///
     /// # Errors
-    /// A folder that cannot be made.
+    /// A folder that cannot be created.
     pub fn create(
         log: &Path,
         name: &str,
         config: &ResolvedConfig,
         pictures: bool,
     ) -> Result<Self, WriteError> {
-        // Whether logs may be replaced was asked before the first ride.
+        // Whether logs may be replaced was checked before the first ride.
         let dir = RunDir::create(&folder_of(log), true, log)?;
         let overlay = if pictures {
             Some(Overlay::new(dir.overlay()?, OverlayStyle::default()))
@@ -133,7 +133,7 @@ impl RunFiles {
         }
         self.timings.add_frame(&report.timings);
         self.first_s.get_or_insert(report.stamp.nanos() as f64 * 1e-9);
-        // The clock of a ride begins at zero, that of its log does not.
+        // The clock of a ride starts at zero, that of its log does not.
         let stamp = log_stamp(report.stamp.nanos());
         let camera = &simulated.frame.camera;
         let odom_from_robot = &simulated.odom_from_robot;
@@ -153,8 +153,8 @@ impl RunFiles {
         self.tracks.write_json(FRAME_NOTES_TOPIC, stamp, &notes)
     }
 
-    /// Completes the folder of a ride whose log is complete; `ridden` is its result, `faults` are those
-    /// that were injected.
+    /// Completes the folder of a ride whose log is complete; `ridden` is its result, `faults` are
+    /// the injected ones.
     ///
     /// # Errors
     /// A file that cannot be read or written.

@@ -1,24 +1,24 @@
 use tagalong_pipeline::FrameReport;
 use tagalong_trials::Ride;
 
-/// Time, s, below which a spell of one reason is joined with others as short beside it.
+/// Duration below which a spell of one reason is joined with other short ones beside it, s.
 const SHORT_S: f64 = 1.0;
 
-/// Spell of one target and one reason for the motion.
+/// Spell with one target and one reason for the motion.
 #[derive(Clone, Debug, PartialEq)]
 struct Spell {
     from_s: f64,
     to_s: f64,
     /// The target and the state of its lock.
     whom: String,
-    /// The reasons, in the order in which they came.
+    /// The reasons in chronological order.
     reasons: Vec<&'static str>,
-    /// The person, the place or the sensor that was the cause at first.
+    /// The person, the place or the sensor that was the first cause.
     cause: Option<String>,
 }
 
 /// Returns the course of a ride: a line for each change of the target and of the reason for the
-/// motion, and for the begin and the end of each injected fault. Reasons that change to and fro within
+/// motion, and for the beginning and the end of each injected fault. Reasons that alternate within
 /// a second share a line.
 pub fn story(ride: &Ride) -> Vec<String> {
     let mut events = fault_events(ride);
@@ -26,7 +26,7 @@ pub fn story(ride: &Ride) -> Vec<String> {
     for spell in joined(spells(ride), &faults_s) {
         events.push((spell.from_s, spell.words()));
     }
-    // Stable: a fault comes before the frame of the same time, which it changes.
+    // The sort is stable: a fault comes before the frame of the same time, which it affects.
     events.sort_by(|a, b| a.0.total_cmp(&b.0));
     events.into_iter().map(|(at_s, said)| format!("{at_s:>6.1} s  {said}")).collect()
 }
@@ -86,7 +86,7 @@ impl Spell {
     }
 }
 
-/// Returns the begin and the end of each fault within the ride, s, with a text.
+/// Returns the beginning and the end of each fault within the ride, s, with a text.
 fn fault_events(ride: &Ride) -> Vec<(f64, String)> {
     let end_s = ride.ticks.last().map_or(0.0, |tick| tick.at_s);
     let mut events = Vec::new();

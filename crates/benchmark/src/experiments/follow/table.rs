@@ -7,14 +7,15 @@ use tagalong_trials::{Ridden, RideJudge};
 
 use super::{Followed, crowd_table};
 
-/// Steps of the reliability curve.
+/// Number of steps of the reliability curve.
 const BINS: usize = 10;
 
-/// Begin of the titles of the tables that compare the probabilities of a lock with the truth.
+/// Beginning of the titles of the tables that compare the probabilities of a target lock with the
+/// truth.
 pub const CALIBRATION: &str = "How far the lock of";
 
-/// Columns of the scores. Those that tell controllers apart come first; nearly all rides are kept, also
-/// by a controller that finds no person again.
+/// Columns of the scores. Those that distinguish controllers come first; nearly all rides are kept,
+/// even with a controller that does not find people again.
 const COLUMNS: [&str; 14] = [
     "rides",
     "in view %",
@@ -33,7 +34,7 @@ const COLUMNS: [&str; 14] = [
 ];
 
 /// Returns the scores of the rides, scene by scene and over all scenes, and the reliability of the
-/// lock's probabilities where there was a lock.
+/// target lock's probabilities if there was a lock.
 pub fn tables(results: &[Followed], seeds: Seeds) -> Vec<Table> {
     let judge = RideJudge::default();
     let pipelines = unique(results.iter().map(|result| result.pipeline.as_str()));
@@ -60,7 +61,8 @@ pub fn tables(results: &[Followed], seeds: Seeds) -> Vec<Table> {
         .collect()
 }
 
-/// Returns the rides of each scene, then all of each value of a sweep over scenes, then all.
+/// Returns the rides of each scene, then those of each value of a sweep over all scenes, then all
+/// rides.
 fn groups(results: &[Followed]) -> Vec<(String, Vec<&Followed>)> {
     let suites = unique(results.iter().map(|result| result.suite.as_str()));
     let values = unique(results.iter().filter_map(|result| result.swept.as_deref()));
@@ -142,7 +144,7 @@ fn cells(results: &[&Followed], judge: &RideJudge) -> Vec<Cell> {
     let after = ratio_of_sums(&rides, |r| found_after(r).sum(), |r| found_after(r).count() as f64);
     let refound: Vec<[u64; 2]> = rides
         .iter()
-        // Resampling whole rides respects that the seconds of one ride are not independent.
+        // Resampling whole rides accounts for the dependence between the seconds of one ride.
         .map(|ride| {
             let all = ride.episodes.iter().filter_map(|e| judge.refound(e, ride.time_s));
             all.fold([0, 0], |[good, of], one| [good + u64::from(one), of + 1])
@@ -173,13 +175,14 @@ fn cells(results: &[&Followed], judge: &RideJudge) -> Vec<Cell> {
     ]
 }
 
-/// The sum of one measure over that of another, of the rides that have any of the other.
+/// Returns the sum of one measure divided by that of another, over the rides that have any of the
+/// other.
 fn ratio_of_sums(
     rides: &[&Ridden],
     part: fn(&Ridden) -> f64,
     whole: fn(&Ridden) -> f64,
 ) -> Option<Interval> {
-    // Rides without any of that time would be a division by zero.
+    // Rides without any of that time would cause a division by zero.
     let of: Vec<&Ridden> = rides.iter().copied().filter(|ride| whole(ride) > 0.0).collect();
     draws_interval(of.len(), |drawn| {
         let part_sum = drawn.iter().map(|&i| part(of[i])).sum::<f64>();
@@ -188,7 +191,7 @@ fn ratio_of_sums(
     })
 }
 
-/// The part that one measure is of another, in per cent.
+/// Returns one measure as a fraction of another, in per cent.
 fn share_cell(
     rides: &[&Ridden],
     part: fn(&Ridden) -> f64,
@@ -199,19 +202,19 @@ fn share_cell(
     Cell::estimate(share, digits).percent()
 }
 
-/// The least value of a measure, where a ride has one.
+/// Returns the minimum of a measure over the rides that have it.
 fn least_cell(rides: &[&Ridden], measure: fn(&Ridden) -> Option<f64>) -> Cell {
     let least = rides.iter().filter_map(|ride| measure(ride)).min_by(f64::total_cmp);
     least.map_or_else(Cell::default, |least| Cell::number(least, 2))
 }
 
-/// Returns the times from coming back into view to being followed, s.
+/// Returns the times from coming back into view until being followed, s.
 fn found_after(ride: &Ridden) -> impl Iterator<Item = f64> {
     ride.episodes.iter().filter_map(|episode| Some(episode.found_s? - episode.in_view_s?))
 }
 
-/// Returns the reliability of the lock's probabilities and, where they are calibrated, that before
-/// the calibration.
+/// Returns the reliability of the target lock's probabilities and, if they are calibrated, that
+/// before the calibration.
 fn reliabilities(results: &[Followed], pipeline: &str, seeds: Seeds) -> Vec<Table> {
     let of: Vec<&Ridden> =
         results.iter().filter(|r| r.pipeline == pipeline).map(|r| &r.ridden).collect();
@@ -232,12 +235,12 @@ fn reliabilities(results: &[Followed], pipeline: &str, seeds: Seeds) -> Vec<Tabl
     tables
 }
 
-/// Returns the probability of the log-odds.
+/// Returns the probability before calibration, from the log-odds.
 pub fn uncalibrated(like: &Likeness) -> f64 {
     1.0 / (1.0 + (-like.log_odds).exp())
 }
 
-/// Returns the share of true matches among the tracks to which the lock gave some probability.
+/// Returns the fraction of true matches among the tracks with a certain probability of the lock.
 fn reliability(
     title: String,
     of: &[&Ridden],
@@ -282,7 +285,7 @@ fn reliability(
     }
 }
 
-/// Returns each name once, in the order of its first place.
+/// Returns each name once, in the order of first occurrence.
 fn unique<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     let mut all = Vec::new();
     for name in names {

@@ -29,7 +29,7 @@ const HARD: [&str; 6] = [
     "crowd",
 ];
 
-/// Pipelines that are compared where none are named.
+/// Pipelines that are compared if none are named.
 const PIPELINES: [&str; 2] = ["depth-ekf", "naive"];
 
 /// Arguments of `tagalong trials`.
@@ -54,8 +54,7 @@ pub struct TrialsArgs {
     /// The first of these seeds, counted within the split: another one gives other random variants.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub first_seed: u64,
-    /// Trials that run at once; the results are the same [default: as many as
-    /// there are cores].
+    /// Number of trials in parallel; it does not affect the results [default: the number of cores].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     pub jobs: Option<u8>,
     /// Output format.
@@ -66,7 +65,7 @@ pub struct TrialsArgs {
 /// Runs the trials and prints the table.
 ///
 /// # Errors
-/// Scenes and configs that cannot be used are exit code 2; plugins that fail are 1.
+/// Scenes and configs that cannot be used give exit code 2; plugins that fail give 1.
 pub fn trials(args: &TrialsArgs, registry: &Registry) -> Outcome {
     let seeds = args.split.seeds(args.first_seed, args.seeds).map_err(Failure::usage)?;
     let contenders = contenders(&args.configs, registry)?;
@@ -129,7 +128,7 @@ pub fn contenders(named: &[PathBuf], registry: &Registry) -> Result<Vec<Contende
     let mut contenders = Vec::new();
     for path in &paths {
         let file = ConfigFile::read(path)?;
-        // Built once now, so that a mistake shows before the first trial.
+        // Built once in advance, so that an error shows before the first trial.
         file.pipeline(registry, None)?;
         contenders.push(contender(&file));
     }

@@ -25,8 +25,7 @@ pub struct Table {
     widths: [usize; 2],
 }
 
-/// Scores of one contender on one suite; intervals have 95 % confidence and are over random
-/// variants.
+/// Scores of one contender on one suite; intervals are over random variants, with 95 % confidence.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
     /// Name of the scene.
@@ -41,8 +40,8 @@ pub struct Row {
     pub idf1: Option<Interval>,
     /// Errors on the floor, robot frame.
     pub error: Option<PositionError>,
-    /// Share of variants in which every person in view was tracked in all frames within 22 cm
-    /// (Wilson).
+    /// Fraction of the variants in which every person in view was tracked in all frames within 22
+    /// cm (Wilson).
     pub success: Option<Interval>,
     /// Identity switches.
     pub switches: u64,
@@ -59,7 +58,7 @@ pub struct GainRow {
     pub baseline: String,
     /// Gain of IDF1.
     pub idf1: Gain,
-    /// Its p-value, corrected for all gains of the table (Holm).
+    /// The p-value, corrected for all gains of the table (Holm).
     pub p_corrected: f64,
 }
 
@@ -95,7 +94,7 @@ impl Table {
                 p_corrected: gain.p_value,
             }));
         }
-        // Corrected anew after each suite, because the number of comparisons has grown.
+        // Corrected again after each suite, because the number of comparisons has grown.
         let p_values: Vec<f64> = self.gains.iter().map(|gain| gain.idf1.p_value).collect();
         for (gain, corrected) in self.gains.iter_mut().zip(holm(&p_values)) {
             gain.p_corrected = corrected;
@@ -198,9 +197,9 @@ impl Table {
         report::Row::ours(format!("{}: {}", row.suite, row.pipeline), cells)
     }
 
-    /// Returns a note on suites that a pipeline solves, which are too easy.
+    /// Returns a note on suites that a pipeline solves completely, which are too easy.
     fn perfection(&self) -> String {
-        // Prints as 1.000.
+        // The mean is printed as 1.000.
         let named =
             self.rows.iter().filter(|row| row.mota.is_some_and(|mota| mota.estimate >= 0.9995));
         let all: Vec<String> =
@@ -213,7 +212,7 @@ impl Table {
     }
 }
 
-/// IDF1 of one contender, draw by draw.
+/// Returns the IDF1 of one contender, draw by draw.
 fn idf1_of(results: &[Vec<Result>], contender: usize) -> Vec<f64> {
     results.iter().map(|draw| draw[contender].identity.idf1()).collect()
 }

@@ -118,7 +118,7 @@ fn check_run(args: &BlurArgs, tracks: &Tracks) -> Result<(), Failure> {
     let name = args.log.file_name().map(OsString::from).unwrap_or_default();
     match (&args.run, &tracks.log_name) {
         (Some(run), Some(of)) if name != OsString::from(of) => Err(Failure::usage(format!(
-            "{} is a run over {of}, and its people are not those of {}",
+            "{} is a run over {of}, so its people are not those of {}",
             run.display(),
             args.log.display()
         ))),
@@ -280,8 +280,8 @@ impl Counts {
             let _ = writeln!(text, "left out: {} of {topic}: {reason}", counted(*count, "message"));
         }
         text.push_str(
-            "people whom the run did not find are not blurred: look through the copy before you share \
-             it\n",
+            "people that the run did not find are not blurred: look through the copy before you \
+             share it\n",
         );
         text
     }

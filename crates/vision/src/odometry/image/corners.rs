@@ -1,4 +1,4 @@
-//! Points of an image that are found again in the next one: corners, at most one in each cell.
+//! Points of an image that can be found again in the next one: corners, at most one per cell.
 
 use nalgebra::Point2;
 use tagalong_core::GreyImage;
@@ -6,17 +6,17 @@ use tagalong_core::GreyImage;
 use crate::odometry::OdometrySettings;
 use crate::odometry::patch::{PIXELS, Patch};
 
-/// Distance between candidates, px of the half image: a patch is as wide as two of these.
+/// Distance between candidates, px of the half image; a patch is twice as wide.
 const STRIDE: usize = 4;
 
-/// Slope in a patch, as a fraction of that of an edge in it.
+/// Mean slope of a patch, as a fraction of the slope of an edge in it.
 const MEAN_SLOPE: f64 = 0.3;
 
-/// Returns the corners of an image, pixels of its full size: those patches whose brightness changes
-/// most in the direction in which it changes least (J. Shi and C. Tomasi, *Good features to track*,
+/// Returns the corners of an image, pixels of its full size: the patches with the largest change of
+/// brightness in the direction of the least change (J. Shi and C. Tomasi, *Good features to track*,
 /// CVPR 1994).
 pub(super) fn corners(levels: &[GreyImage], settings: &OdometrySettings) -> Vec<Point2<f64>> {
-    // Half the size has a quarter of the candidates, and less noise.
+    // The image of half the size has a quarter of the candidates, and less noise.
     let (image, size) = match levels {
         [_, half, ..] => (half, 2),
         [full] => (full, 1),

@@ -1,27 +1,26 @@
-//! A point of an image, found again in the next one.
+//! Tracking of a point from one image to the next.
 
 use nalgebra::{Matrix2, Point2, Vector2};
 use tagalong_core::GreyImage;
 
 use crate::odometry::patch::Patch;
 
-/// Most steps at each size of the images.
+/// Maximum number of steps at each size of the images.
 const STEPS: usize = 15;
 /// A step smaller than this ends the search, px.
 const STILL_PX: f64 = 0.01;
-/// Largest shift of a whole image, as a fraction of its sides.
+/// Maximum shift of a whole image, as a fraction of its sides.
 const REACH: f64 = 0.2;
-/// Largest difference of the brightness of a patch that was found: the noise of a camera, grey
-/// levels, ...
+/// Maximum difference of the brightness of a matching patch: the noise of a camera, grey levels,
+/// ...
 const NOISE_GREY: f64 = 5.0;
-/// ... and a part of the contrast of the patch, for what the transform bends.
+/// ... and a fraction of the contrast of the patch, for the distortion by the motion.
 const BENT: f64 = 0.5;
 
-/// Returns the position of a point of one image in another, pixels, from coarse to fine and from a
-/// guess of its shift (B. Lucas and
-/// T. Kanade, *An iterative image registration technique*, IJCAI 1981; J.-Y. Bouguet, *Pyramidal
-/// implementation of the Lucas Kanade feature tracker*, 2000). `None` where it left the image, or
-/// nothing there looks like it.
+/// Returns the position of a point of one image in another, pixels, searched from coarse to fine
+/// and from a guess of its shift (B. Lucas and T. Kanade, *An iterative image registration
+/// technique*, IJCAI 1981; J.-Y. Bouguet, *Pyramidal implementation of the Lucas Kanade feature
+/// tracker*, 2000). `None` if the point left the image, or nothing there looks like it.
 pub(super) fn track(
     from: &[GreyImage],
     to: &[GreyImage],
@@ -31,7 +30,8 @@ pub(super) fn track(
     let mut shift = guess;
     for level in (1..from.len().min(to.len())).rev() {
         let size = f64::from(1_u32 << level);
-        // A coarse image that shows too little of the point leaves the search to the next one.
+        // If a coarse image shows too little of the point, the search goes on in the next finer
+        // one.
         if let Some((finer, _)) = refined(&from[level], &to[level], at / size, shift / size) {
             shift = finer * size;
         }
@@ -40,8 +40,8 @@ pub(super) fn track(
     (difference <= 1.0).then(|| at + shift)
 }
 
-/// Returns the shift of a whole image to another, pixels of its full size, to the pixel of the
-/// coarsest image: for a camera that jerks by more than a patch shows.
+/// Returns the shift of a whole image relative to another, pixels of its full size, to the accuracy
+/// of a pixel of the coarsest image: for a camera that jerks by more than the width of a patch.
 pub(super) fn whole_shift(from: &[GreyImage], to: &[GreyImage]) -> Vector2<f64> {
     fn reach(side: usize) -> i64 {
         (REACH * side as f64) as i64
@@ -55,7 +55,7 @@ pub(super) fn whole_shift(from: &[GreyImage], to: &[GreyImage]) -> Vector2<f64> 
     for dy in -rows..=rows {
         for dx in -columns..=columns {
             let found = misfit(from, to, (dx, dy));
-            // Of shifts that fit alike, the one that was tried first: none at all goes before.
+            // Of shifts that fit equally well the first one is kept, which is no shift at all.
             if found < best.0 {
                 best = (found, (dx, dy));
             }
@@ -65,8 +65,8 @@ pub(super) fn whole_shift(from: &[GreyImage], to: &[GreyImage]) -> Vector2<f64> 
     Vector2::new(dx as f64, dy as f64) * f64::from(1_u32 << level)
 }
 
-/// Returns the mean difference of the brightness of two images of which the second is shifted, on
-/// the part that both show.
+/// Returns the mean difference of the brightness of two images, of which the second is shifted,
+/// over the part that both show.
 fn misfit(from: &GreyImage, to: &GreyImage, (dx, dy): (i64, i64)) -> f64 {
     fn both(shift: i64, side: usize) -> std::ops::Range<usize> {
         let side = side as i64;
@@ -87,15 +87,17 @@ fn misfit(from: &GreyImage, to: &GreyImage, (dx, dy): (i64, i64)) -> f64 {
     sum as f64 / pixels as f64
 }
 
-/// Returns the shift of a patch and the square of the difference that is left, over that of the
-/// largest difference that passes, from a guess of the shift; `None` where an image ends or shows no corner.
+/// Refines the shift of a patch from a guess. Returns the shift and the square of the remaining
+/// difference, relative to the largest accepted one; `None` beyond the border of an image, or if
+/// the patch has no corner.
 fn refined(
     from: &GreyImage,
     to: &GreyImage,
     at: Point2<f64>,
     guess: Vector2<f64>,
 ) -> Option<(Vector2<f64>, f64)> {
-    // Every pixel of the patch is moved alike, so that the pixel next to the point stands for it.
+    // Every pixel of the patch is moved by the same shift, so the pixel next to the point
+    // represents it.
     let pixel = at.map(|v| v.max(0.0) as usize);
     let patch = Patch::new(from, pixel.x, pixel.y)?;
     let [xx, xy, yy] = patch.products;

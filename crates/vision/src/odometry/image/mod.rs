@@ -1,6 +1,7 @@
-//! Motion of the camera from its images alone, for logs without odometry and depth: corners are
+//! Motion of the camera from its images alone, for logs without odometry and depth. Corners are
 //! tracked from image to image, a rotation and a zoom of the camera are fitted to those that agree,
-//! and told as a turn of the robot, a way ahead, and a nod and a roll of the camera.
+//! and the result is returned as a turn and a forward motion of the robot, and as a nod and a roll
+//! of the camera.
 
 mod corners;
 mod flow;
@@ -20,25 +21,26 @@ use flow::{track, whole_shift};
 use swing::Pair;
 pub use swing::{Swing, SwingFit};
 
-/// Most sizes of an image, each half of the one before.
+/// Maximum number of sizes of an image, each half of the one before.
 const LEVELS: usize = 4;
 /// Smallest side of an image that is worth halving, px.
 const LEAST_SIDE_PX: usize = 48;
-/// Part of the corners that agree on a motion that needs no search for another one.
+/// Fraction of the corners that must agree on a motion so that no other one is searched for.
 const MOST: f64 = 0.6;
-/// Height of a person of whom the upper body alone is known, m.
+/// Assumed height of a person of whom only the upper body is known, m.
 const TALL_M: f64 = 1.8;
-/// Ratio of height and width from which on a region is that of a whole person.
+/// Ratio of height to width from which on a region encloses a whole person.
 const WHOLE_FROM: f64 = 1.5;
-/// Part by which the box of a person is enlarged, for limbs that leave it.
+/// Fraction by which the box of a person is enlarged, for limbs outside of it.
 const LIMBS: f64 = 0.3;
 /// Distance from a fitted motion within which a corner agrees with it, as a fraction of the width of
 /// the image: 1.3 px of 640.
 const AGREES: f64 = 2e-3;
-/// Error of a pan beside that of the corners, px: a scene in depth does not move as if far away, and
-/// people who are no tracks yet do. A camera whose image moves less than that stands still.
+/// Error of a pan in addition to that of the corners, px: a scene with depth does not move like one
+/// far away, and neither do people without a track. A camera whose image moves less than this is at
+/// rest.
 const MODEL_PX: f64 = 0.3;
-/// Error of the way ahead, as a fraction of it: the depth of the scene is a guess.
+/// Error of the forward motion, as a fraction of it, because the depth of the scene is a guess.
 const GUESSED_DEPTH: f64 = 0.5;
 /// Smallest horizontal part of the optical axis for which the camera has a heading.
 const LEAST_LEVEL: f64 = 0.2;
@@ -49,12 +51,12 @@ pub struct CameraMotion {
     last: Option<View>,
 }
 
-/// An image at several sizes, and how it was taken.
+/// An image at several sizes, with the camera that took it.
 struct View {
     levels: Vec<GreyImage>,
     /// The camera as the log describes it.
     nominal: Camera,
-    /// Rotation of the camera in the robot frame, as the images show it.
+    /// Rotation of the camera in the robot frame, estimated from the images.
     mount: UnitQuaternion<f64>,
 }
 
@@ -69,17 +71,17 @@ pub struct CameraMoved {
 }
 
 impl CameraMotion {
-    /// Creates the stage with these settings.
+    /// Creates the estimator with these settings.
     pub fn new(settings: OdometrySettings) -> Self {
         Self { settings, last: None }
     }
 
     /// Returns the robot's motion since the previous frame, and the camera of this one. `motion` is
-    /// that of the log; one that is not rest stays as it is, and the images tell the nod and the roll
-    /// of the camera alone. `people` are those of the previous frame.
+    /// that of the log. Unless it is rest it is returned unchanged, and only the nod and the roll
+    /// of the camera come from the images. `people` are those of the previous frame.
     ///
-    /// A frame without an image or with a panorama leaves everything as it is, and so does one with
-    /// too few corners that agree, which is counted in the funnel.
+    /// A frame without an image or with a panorama changes nothing, nor does one with too few
+    /// corners that agree, which is counted in the funnel.
     pub fn see(
         &mut self,
         frame: &Frame,
@@ -97,7 +99,7 @@ impl CameraMotion {
             nominal: nominal.clone(),
             mount: nominal.robot_from_camera.rotation,
         };
-        // A camera that the log moves is told by the log.
+        // If the log itself moves the camera, the log is right.
         let last = self.last.take().filter(|last| last.nominal == *nominal).zip(motion);
         let moved = last.and_then(|(last, motion)| {
             let found = last.compared(&view, people, &self.settings);
@@ -133,13 +135,14 @@ impl View {
         if near.is_some_and(|fit| fit.points as f64 >= MOST * from.len() as f64) {
             return near.map(|fit| self.without_noise(fit));
         }
-        // A jerk moves corners farther than a patch shows; whole images are compared then.
+        // A jerk moves corners by more than the width of a patch; then whole images are compared
+        // first.
         let shift = whole_shift(&self.levels, &next.levels);
         let far = self.fit_around(next, &from, shift, least);
         near.into_iter().chain(far).reduce(|a, b| if b.points > a.points { b } else { a })
     }
 
-    /// Fits the motion of corners that are looked for around a guess.
+    /// Fits the motion of corners that are searched for around a guess.
     fn fit_around(
         &self,
         next: &Self,
@@ -156,8 +159,8 @@ impl View {
         SwingFit::of_agreeing(&pairs, agrees, min_points)
     }
 
-    /// Returns a fit without a motion that is less than its errors: they would shake the tracks of a
-    /// camera at rest.
+    /// Returns a fit without the motions that are smaller than their errors, which would shake the
+    /// tracks of a camera at rest.
     fn without_noise(&self, fit: SwingFit) -> SwingFit {
         let right = self.nominal.width as f64;
         let bottom = self.nominal.height as f64;
@@ -170,9 +173,8 @@ impl View {
         if is_at_rest { SwingFit { points: fit.points, ..SwingFit::default() } } else { fit }
     }
 
-    /// Returns the motion of the robot and the new rotation of the camera that a motion of the image
-    /// stands for; without one the camera goes back to its mount. `None` if the camera has no
-    /// heading.
+    /// Returns the motion of the robot and the new rotation of the camera that explain a motion of
+    /// the image. Without one the camera returns to its mount. `None` if the camera has no heading.
     fn explained(
         &self,
         found: Option<&SwingFit>,
@@ -187,7 +189,7 @@ impl View {
         let pan = pan - TAU * (pan / TAU).round();
         let level = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -pan) * turned;
         let mount = settled(&level, &self.nominal, motion.dt, settings.settle_s);
-        // Without odometry a log says that the robot stands, surely or not.
+        // A log without odometry reports that the robot is at rest, whether or not that is certain.
         let is_at_rest = [motion.forward, motion.left, motion.turn] == [0.0; 3];
         let by_image = found
             .filter(|fit| is_at_rest && fit.swing != Swing::default())
@@ -195,7 +197,7 @@ impl View {
         Some((by_image.unwrap_or(motion), mount))
     }
 
-    /// Returns the motion of the robot with a turn, rad, and a way ahead by the zoom.
+    /// Returns the motion of the robot with a turn, rad, and a forward motion from the zoom.
     fn moved(
         &self,
         fit: &SwingFit,
@@ -212,7 +214,7 @@ impl View {
         EgoMotion { forward, turn, covariance, ..motion }
     }
 
-    /// Returns the camera of the log with the rotation that the images show.
+    /// Returns the camera of the log with the rotation that was estimated from the images.
     fn camera(&self) -> Camera {
         let translation = self.nominal.robot_from_camera.translation;
         let robot_from_camera = Isometry3::from_parts(translation, self.mount);
@@ -220,8 +222,8 @@ impl View {
     }
 }
 
-/// Returns a rotation of the camera that has gone part of the way back to its mount: errors of many
-/// frames would add up to a camera that looks at the ceiling.
+/// Returns a rotation of the camera that has gone part of the way back to its mount. Otherwise
+/// errors of many frames would add up to a camera that looks at the ceiling.
 fn settled(
     mount: &UnitQuaternion<f64>,
     nominal: &Camera,
@@ -230,7 +232,7 @@ fn settled(
 ) -> UnitQuaternion<f64> {
     let home = nominal.robot_from_camera.rotation;
     let part = 1.0 - (-dt_s / settle_s).exp();
-    // Half a turn has no shortest way back, and is no nod either.
+    // Half a turn has no shortest way back, and is not a nod either.
     mount.try_slerp(&home, part, 1e-9).unwrap_or(home)
 }
 

@@ -1,28 +1,28 @@
-//! Rotation and zoom of a camera, fitted to points of which some are wrong.
+//! Rotation and zoom of a camera, fitted to points with outliers.
 
 use nalgebra::{Matrix2x4, Matrix4, Rotation3, Vector2, Vector3, Vector4};
 use tagalong_math::{RandomSource, SplitMix64};
 
-/// Seed of the samples: the same for each frame, so that a run can be repeated.
+/// Seed of the samples, the same for each frame, so that a run can be repeated.
 const SEED: u64 = 0x5151_1A12;
-/// Random pairs of points that are tried: with half of the points wrong, all of them are bad in one
-/// case of 10^12.
+/// Number of random pairs of points that are tried: if half of the points are wrong, all pairs are
+/// bad in one case of 10^12.
 const TRIALS: usize = 100;
 /// Steps of a fit; the error falls by about a hundredfold in each.
 const STEPS: usize = 4;
-/// Least distance of the two points of a trial, in units of [`SwingFit::of_agreeing`].
+/// Minimum distance of the two points of a trial, in units of [`SwingFit::of_agreeing`].
 const APART: f64 = 50.0;
-/// Part of the points that must agree.
+/// Fraction of the points that must agree.
 const LEAST_PART: f64 = 0.4;
-/// Least-squares fits, each to the points that agree with the one before.
+/// Number of least-squares fits, each to the points that agree with the one before.
 const ROUNDS: usize = 3;
 
 /// A point in the two images, as rays of depth 1: x to the right, y down.
 pub type Pair = [Vector2<f64>; 2];
 
-/// Motion of the image of things that are far away: zoomed by a factor about the optical axis, then
-/// seen by a rotated camera. For a narrow lens and a small rotation it is the similarity transform of
-/// other programs; a pan of a wide lens bends the image, which this model knows.
+/// Motion of the image of distant objects: a zoom about the optical axis, then a rotation of the
+/// camera. For a narrow lens and a small rotation it is the similarity transform that is usual
+/// elsewhere; unlike that, it models how a pan of a wide lens bends the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Swing {
@@ -33,7 +33,7 @@ pub struct Swing {
 }
 
 impl Default for Swing {
-    /// No motion at all.
+    /// Returns no motion at all.
     fn default() -> Self {
         Self { new_from_old: Rotation3::identity(), zoom: 1.0 }
     }
@@ -46,8 +46,8 @@ impl Swing {
         seen.xy() / seen.z
     }
 
-    /// Fits the motion to pairs by least squares (Gauss and Newton); `None` for too few points, or
-    /// points in one place.
+    /// Fits the motion to pairs by least squares (Gauss-Newton); `None` for too few points, or if
+    /// all are in one place.
     fn of_pairs<'p>(pairs: impl Iterator<Item = &'p Pair> + Clone) -> Option<Self> {
         let mut swing = Self::default();
         for _ in 0..STEPS {
@@ -68,8 +68,8 @@ impl Swing {
         })
     }
 
-    /// Returns the derivative of [`Swing::apply`] by a further rotation about x, y and z, rad, and
-    /// by the logarithm of the zoom.
+    /// Returns the derivative of [`Swing::apply`] with respect to a further rotation about x, y and
+    /// z, rad, and to the logarithm of the zoom.
     fn slopes(&self, ray: Vector2<f64>) -> Matrix2x4<f64> {
         let seen = self.new_from_old * (self.zoom * ray).push(1.0);
         let grown = self.new_from_old * (self.zoom * ray).push(0.0);
@@ -90,7 +90,7 @@ impl Swing {
 
     fn after(&self, step: &Vector4<f64>) -> Self {
         let further = Rotation3::new(Vector3::new(step.x, step.y, step.z));
-        // A wild step of a bad sample must not turn the image inside out.
+        // A wild step from a bad sample must not turn the image inside out.
         let zoom = self.zoom * step.w.clamp(-1.0, 1.0).exp();
         Self { new_from_old: further * self.new_from_old, zoom }
     }
@@ -110,14 +110,14 @@ pub struct SwingFit {
     pub sigma_pan: f64,
     /// Standard deviation of the zoom.
     pub sigma_zoom: f64,
-    /// Number of points that agree.
+    /// Number of points that agree with it.
     pub points: usize,
 }
 
 impl SwingFit {
-    /// Returns the motion on which most points agree (M. Fischler and R. Bolles, *Random sample
-    /// consensus*, CACM 1981), within a distance `near` of the rays; `None` if they are fewer than
-    /// `least`, or than two fifths of all.
+    /// Returns the motion on which most points agree (RANSAC; M. Fischler and R. Bolles, *Random
+    /// sample consensus*, CACM 1981), within a distance `near` of the rays; `None` if they are
+    /// fewer than `least`, or fewer than two fifths of all.
     pub fn of_agreeing(pairs: &[Pair], near: f64, least: usize) -> Option<Self> {
         let least = least.max((LEAST_PART * pairs.len() as f64).ceil() as usize).max(3);
         let mut best = consensus(pairs, near)?;
@@ -136,7 +136,7 @@ impl SwingFit {
     fn of(swing: Swing, agreeing: &[&Pair]) -> Option<Self> {
         let count = agreeing.len();
         let left: f64 = agreeing.iter().map(|pair| swing.misses_by(pair).powi(2)).sum();
-        // Two numbers of each point, and the four of the motion.
+        // Two numbers per point, minus the four of the motion.
         let variance = left / (2.0 * count as f64 - 4.0).max(1.0);
         let (matrix, _) = swing.equations(agreeing.iter().copied());
         let covariance = matrix.try_inverse()? * variance;

@@ -1,5 +1,5 @@
-//! `tagalong follow --approaches`: people and trolleys come at the robot from every side, and the
-//! contacts while it moves are counted.
+//! `tagalong follow --approaches`: people and trolleys move towards the robot from every side, and
+//! the contacts while it moves are counted.
 
 mod story;
 mod table;
@@ -27,7 +27,7 @@ use tagalong_trials::{
 use super::log::RideLog;
 use super::{FollowArgs, contenders, failure, folder_name, inject, run_files, swept, variant};
 
-/// Files of results, beside the logs of the approaches.
+/// Result files, in addition to the logs of the approaches.
 const RESULTS: [&str; 2] = ["approaches.json", "approaches.md"];
 /// The scene of all approaches unless scenes are named.
 const SCENE: &str = "configs/scenes/approach.toml";
@@ -40,7 +40,7 @@ pub enum ApproachFaults {
     /// None.
     #[default]
     None,
-    /// One in each approach; the seed draws its kind and its time.
+    /// One in each approach; the seed chooses its kind and its time.
     One,
 }
 
@@ -91,14 +91,14 @@ struct Findings<'a> {
     approaches: &'a [Outlived],
 }
 
-/// Rides the approaches and prints how often the robot moved at a contact.
+/// Runs the approaches and prints how often the robot was moving at a contact.
 pub(super) fn approaches(args: &FollowArgs, registry: &Registry) -> Outcome {
     let signals = Signals::listen()?;
     let seeds = seeds(args)?;
     let contenders = contenders(args, registry)?;
     let paths = scenes(args);
     let jobs = jobs(args, &contenders, &paths, seeds);
-    // A scene that cannot be read is found before the first ride.
+    // A scene that cannot be read is reported before the first ride.
     for job in jobs.iter().filter(|job| seeds.numbers().start == job.seed) {
         read_scene(job, args)?;
     }
@@ -130,7 +130,7 @@ pub(super) fn approaches(args: &FollowArgs, registry: &Registry) -> Outcome {
     Ok(Ended::Well)
 }
 
-/// Returns the seeds of the approaches: those that are counted, or the replayed one.
+/// Returns the seeds of the approaches: those of the requested number, or the replayed one.
 fn seeds(args: &FollowArgs) -> Result<Seeds, Failure> {
     let seeds = match args.replay {
         Some(seed) => Split::of(seed).seeds(seed, 1),
@@ -167,11 +167,11 @@ fn jobs<'a>(
     jobs
 }
 
-/// Returns the scene of an approach: everything in it depends on the seed alone.
+/// Returns the scene of an approach, which depends only on the seed.
 fn read_scene(job: &Job<'_>, args: &FollowArgs) -> Result<Scene, Failure> {
     let mut variant = variant(args, job.seed);
     variant.split = Some(Split::of(job.seed));
-    // Behind the values of the user, which win.
+    // Inserted after the values of the user, which have priority.
     if has_laser(args.laser, job.seed) {
         variant.set.insert(0, ("laser".to_owned(), "{}".to_owned()));
     }
@@ -180,8 +180,8 @@ fn read_scene(job: &Job<'_>, args: &FollowArgs) -> Result<Scene, Failure> {
     let Some(approach) = &scene.approach else {
         let shown = job.path.display();
         return Err(Failure::usage(format!(
-            "{shown} has no table [approach]: nothing comes at the robot in it; add one, or leave \
-             out the scene for {SCENE}"
+            "{shown} has no table [approach], so nothing approaches the robot in it; add one, or \
+             leave out the scene for {SCENE}"
         )));
     };
     let arrives_s = approach.arrives_s();
@@ -204,8 +204,8 @@ fn has_laser(laser: ApproachLaser, seed: u64) -> bool {
     }
 }
 
-/// Rides one approach; `None` after a stop signal. A contact while the robot moves is ridden again
-/// for its log, because the log of every approach would fill a disk.
+/// Runs one approach; `None` after a stop signal. If there is a contact while the robot moves, the
+/// approach is run again with a log, because the logs of all approaches would fill a disk.
 fn approach(
     job: &Job<'_>,
     args: &FollowArgs,
@@ -243,7 +243,7 @@ fn ride(
     let mut watch = ApproachWatch::new(scene, &mut log);
     let ride = Ride::new(scene, job.contender, registry, &mut watch)?;
     log.finish(None, &[])?;
-    // A ride that a signal cut short says nothing.
+    // A ride that a signal interrupted has no meaningful result.
     if signals.received().is_some() {
         return Ok(None);
     }

@@ -3,8 +3,8 @@ use tagalong_trials::{ApproachJudge, Approached, Contact, Ride, Tick};
 
 use crate::experiments::follow::story::words;
 
-/// Returns the course of an approach: who comes from where, the faults, and a line for each change of
-/// the target and of the reason for the motion.
+/// Returns the course of an approach: the approacher and its direction, the faults, and a line for
+/// each change of the target and of the reason for the motion.
 pub fn story(
     scene: &Scene,
     ride: &Ride,
@@ -18,7 +18,7 @@ pub fn story(
     lines
 }
 
-/// Returns the setting in words.
+/// Returns the initial situation in words.
 fn opening(scene: &Scene, approached: &Approached) -> String {
     let Some(approach) = &scene.approach else { return String::new() };
     let [length, width, height] = approach.size_m;
@@ -42,7 +42,7 @@ fn opening(scene: &Scene, approached: &Approached) -> String {
     )
 }
 
-/// Returns a line for each change, in the order of time.
+/// Returns a line for each change, in chronological order.
 fn changes(ride: &Ride, judge: &ApproachJudge) -> Vec<String> {
     let mut lines: Vec<(f64, String)> = Vec::new();
     let mut before = None;

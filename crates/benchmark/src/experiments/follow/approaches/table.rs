@@ -46,15 +46,15 @@ const COLUMNS: [&str; 15] = [
     "fastest m/s",
 ];
 
-/// Approaches by what they have in common, in the order of the rows.
+/// Strata of approaches with a common property, in the order of the rows.
 struct Strata<'a> {
     all: &'a [&'a Approached],
     named: Vec<(String, Vec<&'a Approached>)>,
 }
 
 impl<'a> Strata<'a> {
-    /// Adds the approaches of which `is_in` is true, if they are some of them: a stratum with all
-    /// approaches would repeat the first row.
+    /// Adds the approaches for which `is_in` is true, unless these are none or all of them: a
+    /// stratum with all approaches would repeat the first row.
     fn add(&mut self, name: String, is_in: impl Fn(&Approached) -> bool) {
         let of: Vec<&Approached> = self.all.iter().copied().filter(|one| is_in(one)).collect();
         if !of.is_empty() && of.len() < self.all.len() {
@@ -63,7 +63,7 @@ impl<'a> Strata<'a> {
     }
 }
 
-/// Returns the name of each stratum that some approaches are in, with those approaches.
+/// Returns the name of each stratum that contains approaches, with those approaches.
 fn strata<'a>(all: &'a [&'a Approached]) -> Vec<(String, Vec<&'a Approached>)> {
     let mut strata = Strata { all, named: vec![("all".to_owned(), all.to_vec())] };
     for laser in [false, true] {
@@ -101,7 +101,7 @@ fn has_fault(approached: &Approached, kind: &str) -> bool {
     approached.faults.iter().any(|fault| fault.kind.name() == kind)
 }
 
-/// Returns the different values of a setting, in rising order.
+/// Returns the distinct values of a setting, in ascending order.
 fn values(all: &[&Approached], of: fn(&Approached) -> f64) -> Vec<f64> {
     let mut values: Vec<f64> = all.iter().map(|one| of(one)).collect();
     values.sort_by(f64::total_cmp);
@@ -109,7 +109,7 @@ fn values(all: &[&Approached], of: fn(&Approached) -> f64) -> Vec<f64> {
     values
 }
 
-/// Returns the different names, in alphabetic order.
+/// Returns the distinct names, in alphabetical order.
 fn names(all: &[&Approached], of: fn(&Approached) -> Vec<&'static str>) -> Vec<&'static str> {
     let mut names: Vec<&'static str> = all.iter().flat_map(|one| of(one)).collect();
     names.sort_unstable();
