@@ -180,8 +180,8 @@ impl Inspection {
             self.usable.push("detections");
         }
         self.usable.extend(facts.sensor_topics.keys());
-        let [colour, depth] = [&facts.colour_topic, &facts.depth_topic]
-            .map(|topic| scan.topics.get(topic.as_ref()?));
+        let [colour, depth] =
+            [&facts.colour_topic, &facts.depth_topic].map(|topic| scan.topics.get(topic.as_ref()?));
         let both = colour.zip(depth);
         self.skew = both.and_then(|(colour, depth)| depth.skew_from(colour, tolerance_s));
     }
@@ -281,7 +281,7 @@ impl fmt::Display for TopicFacts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}  {}  {}", self.topic, self.schema, counted(self.count, "message"))?;
         if let Some(rate) = self.rate_hz {
-            write!(f, ", {rate:.2} Hz")?;
+            write!(f, ", recorded at {rate:.2} Hz")?;
         }
         if let Some(image) = &self.image {
             write!(f, ", {}", image.pixels)?;

@@ -16,8 +16,9 @@ pub fn laser(evidence: &Evidence) -> Option<Finding> {
                 .remedy("publish tf from the robot to the scanner; [input] laser_topic = \"...\""),
         );
     }
-    let rate = evidence.inspection.topic(topic).and_then(|topic| topic.rate_hz);
-    let rate = rate.map_or_else(|| "one scan".to_owned(), |hz| format!("{hz:.1} scans a second"));
+    let facts = evidence.inspection.topic(topic);
+    let period_s = facts.and_then(|facts| facts.timing).map(|timing| timing.median_period_s);
+    let rate = rate_words(period_s, facts.and_then(|facts| facts.rate_hz));
     let step_deg = scans.increment_rad.to_degrees();
     let valid = scans.valid();
     // A scanner outdoors sees the sky in most directions, which is no fault.
@@ -50,4 +51,26 @@ pub fn laser(evidence: &Evidence) -> Option<Finding> {
 
 fn wrong_height(is_wrong: bool) -> Severity {
     if is_wrong { Severity::Warn } else { Severity::Ok }
+}
+
+/// Returns the rate from the median period of the stamps, s, as in the finding `rate`; without one from
+/// the rate of recording, which transport may change.
+fn rate_words(period_s: Option<f64>, recorded_hz: Option<f64>) -> String {
+    match (period_s, recorded_hz) {
+        (Some(period_s), _) => format!("{:.1} scans a second", 1.0 / period_s),
+        (None, Some(recorded_hz)) => format!("scans recorded at {recorded_hz:.1} a second"),
+        (None, None) => "one scan".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rate_of_scans_is_that_of_their_stamps() {
+        assert_eq!(rate_words(Some(0.1), Some(408.8)), "10.0 scans a second");
+        assert_eq!(rate_words(None, Some(408.8)), "scans recorded at 408.8 a second");
+        assert_eq!(rate_words(None, None), "one scan");
+    }
 }

@@ -1,5 +1,6 @@
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
+use super::odometry::{Motion, motion};
 use super::{Alternative, better};
 
 /// Blobs below which shares mean little.
@@ -39,8 +40,17 @@ pub fn missed(evidence: &Evidence) -> Option<Finding> {
             example.bearing_deg.abs()
         );
     }
-    if let Some((cause, count)) = evidence.causes.first() {
-        measured += &format!(". Cause in {count} of {}: {}", coverage.unexplained, cause.why);
+    match (motion(evidence), evidence.causes.first()) {
+        (Motion::Likely, _) => {
+            measured +=
+                "; things at rest come and go, too, where the robot moves (finding odometry)";
+        }
+        (doubt, Some((cause, count))) => {
+            let lead =
+                if doubt == Motion::Possible { "If the robot is at rest, cause" } else { "Cause" };
+            measured += &format!(". {lead} in {count} of {}: {}", coverage.unexplained, cause.why);
+        }
+        (_, None) => {}
     }
     let finding = Finding::new("missed", severity, measured)
         .figure("blobs", coverage.blobs as f64)
@@ -52,6 +62,9 @@ pub fn missed(evidence: &Evidence) -> Option<Finding> {
 
 /// Returns the change that helped most on this log, else a general one.
 fn remedy(evidence: &Evidence) -> String {
+    if motion(evidence) == Motion::Likely {
+        return "see the finding odometry first".to_owned();
+    }
     let now = &evidence.coverage;
     match better(evidence, |other| other.unexplained < now.unexplained) {
         Some(Alternative { change, coverage }) => format!(

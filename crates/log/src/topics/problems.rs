@@ -164,8 +164,7 @@ pub(super) fn detections_problem(
     let off_s = other_clock_s.unwrap_or(-skew.median_s);
     let times = if scan.has_recording_times { "times of recording" } else { "stamps" };
     let is_near = off_s.abs() < near_s(frames, frames);
-    let offset =
-        if is_near || other_clock_s.is_some() { offset(off_s) } else { around(off_s) };
+    let offset = if is_near || other_clock_s.is_some() { offset(off_s) } else { around(off_s) };
     let why = format!(
         "none of its messages is within {:.0} ms of a frame: by their {times} they come {offset} it",
         1e3 * tolerance_s,

@@ -4,7 +4,8 @@ use tagalong_core::Stamp;
 use tagalong_math::median;
 
 use super::problems::{
-    Problem, RECORDING, TOGETHER, WHOLE_SECONDS, at_capture, near_s, pairing_problem, wider_tolerance,
+    Problem, RECORDING, TOGETHER, WHOLE_SECONDS, at_capture, near_s, pairing_problem,
+    wider_tolerance,
 };
 use crate::scan::{Scan, Topic};
 use crate::timing::{Skew, Timing, nearest};
@@ -116,16 +117,15 @@ fn is_short(frames: &Topic, partners: &Topic, tolerance_s: f64) -> Option<String
         return None;
     }
     let is_late = early > late;
-    let (missing_s, recorded_s) = if is_late {
-        (
-            times.first.seconds_since(of_frames.first),
-            times.first_recorded.seconds_since(of_frames.first_recorded),
-        )
+    let missing_s = if is_late {
+        times.first.seconds_since(of_frames.first)
     } else {
-        (
-            of_frames.last.seconds_since(times.last),
-            of_frames.last_recorded.seconds_since(times.last_recorded),
-        )
+        of_frames.last.seconds_since(times.last)
+    };
+    let recorded_s = if is_late {
+        times.first_recorded.seconds_since(of_frames.first_recorded)
+    } else {
+        of_frames.last_recorded.seconds_since(times.last_recorded)
     };
     // Stamps alone may be those of another clock.
     if recorded_s < RECORDED_PART * missing_s {
@@ -166,12 +166,7 @@ fn is_slower(frames: &Topic, partners: &Topic, tolerance_s: f64) -> bool {
 }
 
 /// Returns the problem of partners that are missing, or of stamps that are too far apart.
-fn missing_or_apart(
-    scan: &Scan,
-    frames: &Topic,
-    partners: &Topic,
-    tolerance_s: f64,
-) -> Problem {
+fn missing_or_apart(scan: &Scan, frames: &Topic, partners: &Topic, tolerance_s: f64) -> Problem {
     let mut sorted = partners.stamps.clone();
     sorted.sort();
     let offsets = frames.stamps.iter().filter_map(|at| nearest(&sorted, *at)).map(f64::abs);
