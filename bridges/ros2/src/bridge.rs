@@ -2,11 +2,11 @@ use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
-use tagalong::core::Stamp;
+use tagalong::core::{Input, Stamp};
 use tagalong::log::msgs::Header;
 use tagalong::log::write::FrameRecord;
 use tagalong::log::{LiveSource, LogFrame};
-use tagalong::pipeline::{Enable, EnableSwitch, FrameReport, Permission, Pipeline};
+use tagalong::pipeline::{Enable, EnableSwitch, FrameReport, Permission, Pipeline, StepError};
 use tagalong_view::Live;
 
 use crate::diagnostics::{Diagnostics, Status};
@@ -75,6 +75,9 @@ pub(crate) struct Bridge {
     base_frame: String,
     odom_frame: String,
     frames: u64,
+    /// Frames that lacked an input of the pipeline, and what the newest frame lacks.
+    lacking: u64,
+    lacks: Option<Input>,
     heard: Instant,
     quiet: bool,
     /// True while frames have older stamps than earlier ones.
@@ -155,6 +158,8 @@ impl Bridge {
             base_frame,
             odom_frame: setup.input.odom_frame,
             frames: 0,
+            lacking: 0,
+            lacks: None,
             heard: Instant::now(),
             quiet: false,
             went_back: false,
@@ -331,6 +336,7 @@ impl Bridge {
             enable_publishers: enables,
             untimely: self.gates.enable.untimely() + self.gates.reset.untimely(),
             malformed: self.inbox.traffic().values().map(|topic| topic.malformed).sum(),
+            lacks: self.lacks,
             is_resting: false,
             driver: self.driver_state(),
         });
@@ -403,10 +409,17 @@ impl Bridge {
         if let Some(cause) = self.pipeline.fault().filter(|cause| Some(*cause) != known) {
             self.latch(cause, tell);
         }
-        // A robot with stale odometry must not move, but may do so again afterwards.
-        self.obey(!found.odom_stale);
+        // A robot with stale odometry must not move, but may again afterwards. One that is enabled has to
+        // wait for the next frame: commands that the base did not execute may be of full speed.
+        self.obey(is_driving);
         // Returned only now, so that the wheels are informed of a failed step.
+        if let Err(error @ StepError::Lacks { input, .. }) = &report {
+            self.lacks = Some(*input);
+            self.pass_over(error, tell);
+            return Ok(());
+        }
         let report = report?;
+        self.lacks = None;
         self.frames += 1;
         let status = self.pipeline.status();
         if let Some(follower) = &self.follower {
@@ -421,6 +434,19 @@ impl Bridge {
             live.offer(&found.frame, &found.odom_from_robot, &report);
         }
         Ok(())
+    }
+
+    /// Counts a frame that lacks an input, and tells it of the first one; the wheels have stopped.
+    fn pass_over(&mut self, error: &StepError, tell: &dyn Fn(&str)) {
+        self.lacking += 1;
+        if let Some(follower) = &self.follower {
+            follower.note_frame(false);
+        }
+        if self.lacking == 1 {
+            tell(&format!(
+                "warning: {error}: the robot stops for each such frame; they are counted"
+            ));
+        }
     }
 
     fn obey(&self, may_move: bool) {
@@ -531,10 +557,14 @@ impl Bridge {
     }
 
     fn summary(&self) -> Summary {
+        let mut counters = self.source.counters().clone();
+        if self.lacking > 0 {
+            counters.insert("frames_without_required_input", self.lacking);
+        }
         Summary {
             frames: self.frames,
             traffic: self.inbox.traffic(),
-            counters: self.source.counters().clone(),
+            counters,
             told: CommandCounts::default(),
         }
     }

@@ -6,6 +6,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use ros2_client::Publisher;
+use tagalong::core::Input;
 use tagalong::log::msgs::Header;
 use tagalong::pipeline::Permission;
 
@@ -45,6 +46,8 @@ pub(crate) struct Status {
     pub(crate) untimely: u64,
     /// Number of messages that could not be decoded.
     pub(crate) malformed: u64,
+    /// Input that the last frame lacks.
+    pub(crate) lacks: Option<Input>,
     /// True while the node is not active.
     pub(crate) is_resting: bool,
     /// State of Nav2's following server, if that drives.
@@ -174,6 +177,9 @@ impl Status {
         if now.saturating_duration_since(self.heard) > STALE_AFTER {
             return (STALE, "no frames".into());
         }
+        if let Some(input) = self.lacks {
+            return (WARN, format!("the last frame has no {input}: the robot stands"));
+        }
         match self.permission {
             _ if self.rivals > 0 => (WARN, "other nodes publish commands".into()),
             Some(Permission::Latched(cause)) => (WARN, cause.into()),
@@ -207,6 +213,7 @@ mod tests {
             enable_publishers: 1,
             untimely: 0,
             malformed: 0,
+            lacks: None,
             is_resting: false,
             driver: None,
         };
@@ -217,6 +224,7 @@ mod tests {
         let late = well.worst(now + Duration::from_millis(1001));
         assert_eq!(late.0, STALE);
         let fault = Status { fault: Some("odometry jumped"), permission: latched, ..well };
+        let blind = Status { lacks: Some(Input::Laser), ..well };
         let missing = Status { driver: Some(DriverState::Missing), ..well };
         let unconfirmed = Status { driver: Some(DriverState::Unconfirmed), ..fault };
         let contested = Status { enable_publishers: 2, ..well };
@@ -228,6 +236,7 @@ mod tests {
             (unheard, OK, "not enabled: no node publishes the enable"),
             (contested, ERROR, "2 publishers of the enable: end all but one"),
             (fault, ERROR, "fault: odometry jumped"),
+            (blind, WARN, "the last frame has no laser scans: the robot stands"),
             (missing, WARN, "no following server of Nav2"),
             (unconfirmed, ERROR, "Nav2 does not confirm that it stops"),
         ] {

@@ -1,4 +1,4 @@
-//! All people of a log, the changes to them, and the way back.
+//! All people of a log, changes to them, and undo.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,17 +7,17 @@ use tagalong_eval::Region;
 
 use crate::person::{Key, Person};
 
-/// Steps that can be undone.
+/// Largest number of steps that can be undone.
 const STEPS: usize = 1000;
 
-/// Largest number of a person.
+/// Largest ID of a person.
 pub const MOST_ID: i64 = 999;
 
-/// Frames of a change, from the one that is shown.
+/// Frames of a change, relative to the one that is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Scope {
-    /// The frame alone.
+    /// Only the frame.
     #[default]
     Frame,
     /// The frame and all later ones.
@@ -39,35 +39,35 @@ impl Scope {
     }
 }
 
-/// Change of one person in one frame, as the page asks for it.
+/// Change of one person in one frame, as the page requests it.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(tag = "op", rename_all = "lowercase", deny_unknown_fields)]
 pub enum Change {
-    /// Sets the box of a person; without a number it is a new one.
+    /// Sets the box of a person; without an ID the person is new.
     Box { frame: u32, id: Option<i64>, region: [f64; 4] },
     /// Sets the box of a person whose head is at a pixel.
     Head { frame: u32, id: Option<i64>, at: [f64; 2] },
-    /// Gives a person another number.
+    /// Gives a person another ID.
     Number { frame: u32, id: i64, to: i64, scope: Scope },
-    /// Takes a person out of frames.
+    /// Removes a person from frames.
     Delete { frame: u32, id: i64, scope: Scope },
-    /// Makes a key of an interpolated box.
+    /// Turns an interpolated box into a key.
     Pin { frame: u32, id: i64 },
-    /// Takes a key back.
+    /// Removes a key.
     Unpin { frame: u32, id: i64 },
-    /// Fills the pause around a frame.
+    /// Fills the gap around a frame.
     Fill { frame: u32, id: i64 },
-    /// Says that all boxes of a frame are right.
+    /// Marks all boxes of a frame as reviewed.
     Review { frame: u32 },
     /// Notes on the box of a person.
     Note { frame: u32, id: i64, ignore: Option<bool>, visible: Option<f64> },
-    /// Takes the last change back.
+    /// Undoes the last change.
     Undo,
-    /// Makes the last change that was taken back once more.
+    /// Redoes the last change that was undone.
     Redo,
 }
 
-/// People as they were before a change; none where there was no such person.
+/// People before a change; `None` for a person that did not exist.
 type Step = BTreeMap<i64, Option<Person>>;
 
 /// All people of a log, with the changes that can be undone.
@@ -84,25 +84,25 @@ impl Document {
         Self { people, ..Self::default() }
     }
 
-    /// Returns the people by their numbers.
+    /// Returns the people by their IDs.
     pub fn people(&self) -> &BTreeMap<i64, Person> {
         &self.people
     }
 
-    /// Returns the smallest free number.
+    /// Returns the smallest free ID.
     pub fn free_id(&self) -> i64 {
         (1..).find(|id| !self.people.contains_key(id)).unwrap_or(MOST_ID)
     }
 
-    /// Returns whether there is a change to undo, and one to make again.
+    /// Returns whether there is a change to undo, and one to redo.
     pub fn can(&self) -> (bool, bool) {
         (!self.undo.is_empty(), !self.redo.is_empty())
     }
 
-    /// Makes a change; returns the numbers of the people that changed.
+    /// Makes a change; returns the IDs of the people that changed.
     ///
     /// # Errors
-    /// A sentence for the user: a person that is not in the frame, a number out of range.
+    /// A sentence for the user: a person that is not in the frame, an ID out of range.
     pub fn apply(&mut self, change: &Change) -> Result<BTreeSet<i64>, String> {
         match change {
             Change::Undo => Ok(Self::back(&mut self.people, &mut self.undo, &mut self.redo)),
@@ -111,7 +111,7 @@ impl Document {
         }
     }
 
-    /// Takes the last step of one list back, and puts it on the other.
+    /// Reverts the last step of one list, and moves it to the other.
     fn back(
         people: &mut BTreeMap<i64, Person>,
         from: &mut Vec<Step>,
@@ -149,7 +149,7 @@ impl Document {
         Ok(changed)
     }
 
-    /// Returns the numbers of the people that a change may touch, after checking it.
+    /// Checks a change, and returns the IDs of the people that it may affect.
     fn touched(&self, change: &Change) -> Result<Vec<i64>, String> {
         match change {
             Change::Box { id, region, .. } => {
@@ -175,7 +175,7 @@ impl Document {
         }
     }
 
-    /// This person alone, where the document has it.
+    /// Returns only this person, if the document has it.
     fn known_person(&self, id: i64) -> Result<Vec<i64>, String> {
         if !self.people.contains_key(&id) {
             return Err(format!("there is no person {id}"));
@@ -183,7 +183,7 @@ impl Document {
         Ok(vec![id])
     }
 
-    /// This person alone, where it is in the frame.
+    /// Returns only this person, if it is in the frame.
     fn person_in_frame(&self, id: i64, frame: u32) -> Result<Vec<i64>, String> {
         match self.people.get(&id).map(|person| person.at(frame)) {
             Some(Some(_)) => Ok(vec![id]),
@@ -197,7 +197,7 @@ impl Document {
         people.map(|(id, _)| *id).collect()
     }
 
-    /// Makes a change that was checked.
+    /// Makes a checked change.
     fn perform(&mut self, change: &Change) {
         match *change {
             Change::Box { frame, id, region: [x, y, width, height] } => {
@@ -240,8 +240,8 @@ impl Document {
         }
     }
 
-    /// Gives the boxes of one person in a scope the number of another. Where both are in the same
-    /// frames they change numbers, otherwise the two become one.
+    /// Gives the boxes of one person in a scope the ID of another. If both are in the same frames,
+    /// they swap IDs; otherwise they are merged.
     fn renumber(&mut self, id: i64, to: i64, scope: Scope, frame: u32) {
         if id == to {
             return;
@@ -255,7 +255,7 @@ impl Document {
         self.put(to, one);
     }
 
-    /// Takes the part of a person in a scope out of the document.
+    /// Removes the part of a person in a scope from the document, and returns it.
     fn take_part(&mut self, id: i64, scope: Scope, frame: u32) -> Person {
         let mut whole = self.people.remove(&id).unwrap_or_default();
         let range = scope.frames(frame);
@@ -341,7 +341,7 @@ mod tests {
         }
         assert_eq!(document.can(), (true, false));
         assert!(document.apply(&Change::Redo).unwrap().is_empty());
-        // A new change is the end of the way forward.
+        // A new change clears the changes to redo.
         document.apply(&Change::Undo).unwrap();
         set(&mut document, 1, 5, 0.0);
         assert_eq!(document.can(), (true, false));

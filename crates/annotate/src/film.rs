@@ -1,5 +1,5 @@
-//! Images and depth of all frames, kept in a temporary file, so that the page can ask for any frame
-//! of a log that can only be read from its beginning.
+//! Images and depth of all frames, stored in a temporary file, so that the page can request any
+//! frame of a log that can only be read sequentially.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -11,20 +11,20 @@ use tagalong_eval::Region;
 use tagalong_geometry::{Camera, HEAD_BELOW_TOP_M, HEAD_RADIUS_M, Rect, UPPER_BODY_SIDE_M};
 use tagalong_render::jpeg;
 
-/// Quality of the images: people look at them, and no program measures in them.
+/// JPEG quality of the images, which are only displayed and not measured.
 const QUALITY: u8 = 88;
 
-/// Depth is kept in whole parts of this, m.
+/// Resolution of the stored depth, m.
 const DEPTH_UNIT_M: f32 = 1e-3;
 
 /// Side of the box of a head at a pixel without depth, as a share of the image's width.
 const SIDE_WITHOUT_DEPTH: f64 = 0.15;
 
-/// Side of the square around a pixel in which depth is looked for, pixels.
+/// Side of the square around a pixel in which depth is read, pixels.
 const PROBE_PX: f64 = 9.0;
 
-/// Factor between the depth in a box and the depth by the size of the box up to which both are of
-/// the same person: boxes are drawn by hand, and people differ in size.
+/// Largest ratio between the depth in a box and the depth by the size of the box with which both
+/// belong to the same person; boxes are drawn by hand, and people differ in size.
 const SAME_DEPTH: f64 = 1.4;
 
 /// Part of the temporary file.
@@ -47,7 +47,7 @@ pub struct Shot {
     depth: Option<(Piece, usize, usize)>,
 }
 
-/// Place of a head by depth.
+/// Position of a head, measured in depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
     /// Surface of the head in the camera frame, m: right, down, forward.
@@ -68,7 +68,7 @@ impl Film {
     /// Returns a film without frames.
     ///
     /// # Errors
-    /// A temporary file that cannot be made.
+    /// A temporary file that cannot be created.
     pub fn new() -> io::Result<Self> {
         let store = Mutex::new(tempfile::tempfile()?);
         Ok(Self { shots: Vec::new(), store, end: 0 })
@@ -121,18 +121,18 @@ impl Film {
         &self.shots
     }
 
-    /// Returns the frame of a number.
+    /// Returns the frame with a number.
     pub fn shot(&self, number: u32) -> Option<&Shot> {
         let at = self.shots.binary_search_by_key(&number, |shot| shot.number).ok()?;
         self.shots.get(at)
     }
 
-    /// Returns true if some frame has depth.
+    /// Returns true if any frame has depth.
     pub fn has_depth(&self) -> bool {
         self.shots.iter().any(|shot| shot.depth.is_some())
     }
 
-    /// Returns the image of a frame as JPEG; none without an image.
+    /// Returns the image of a frame as JPEG; `None` without an image.
     ///
     /// # Errors
     /// A temporary file that cannot be read.
@@ -143,30 +143,30 @@ impl Film {
 
     fn depth(&self, number: u32) -> Option<DepthImage> {
         let (piece, width, height) = self.shot(number)?.depth?;
-        // A temporary file that fails leaves the place empty, as a frame without depth does.
+        // If the temporary file fails, the position is unknown, as in a frame without depth.
         unpacked(&self.read(piece).ok()?, width, height)
     }
 
-    /// Measures the places of the heads of people in the boxes of a frame.
+    /// Measures the positions of the heads of people in the boxes of a frame.
     pub fn places(&self, number: u32, regions: &[Region]) -> Vec<Option<Place>> {
         let camera = self.shot(number).map(|shot| Arc::clone(&shot.camera));
-        // Unpacking takes longer than measuring, so it is done once for all.
+        // Decompressing takes longer than measuring, so it is done once for all people.
         let (Some(camera), Some(depth)) = (camera, self.depth(number)) else {
             return vec![None; regions.len()];
         };
         regions.iter().map(|region| place(&camera, &depth, region)).collect()
     }
 
-    /// Returns the place of the head of a person in a box whose depth is known otherwise.
+    /// Returns the position of the head of a person in a box whose depth is known from elsewhere.
     pub fn head(&self, number: u32, region: &Region, depth_m: f64) -> Option<[f64; 3]> {
         let square = Rect::new(region.x, region.y, region.width, region.height);
         let camera = &self.shot(number)?.camera;
-        // The depth of a panorama is horizontal, and no coordinate of a place.
+        // The depth of a panorama is a horizontal distance, and not a coordinate of the position.
         camera.panorama().is_none().then(|| head_at(camera, &square, depth_m))?
     }
 
-    /// Returns the upper body of a person whose head is at a pixel: as large as depth says, or as
-    /// `like`, or as a share of the image.
+    /// Returns the upper body of a person whose head is at a pixel; its size comes from depth, from
+    /// `like`, or from the size of the image.
     pub fn upper_body(
         &self,
         number: u32,
@@ -183,7 +183,7 @@ impl Film {
         Some(Region { x: at.x - 0.5 * side, y: at.y - above, width: side, height: side })
     }
 
-    /// Returns the box of a person of whom only the place of the head is known.
+    /// Returns the box of a person for whom only the position of the head is known.
     pub fn region_of(&self, number: u32, head_in_camera_m: [f64; 3]) -> Option<Region> {
         let camera = &self.shot(number)?.camera;
         let surface = Point3::from(head_in_camera_m);
@@ -193,8 +193,8 @@ impl Film {
     }
 }
 
-/// Measures the place of the head of a person in a box, by the depth of the face, or else of the
-/// torso.
+/// Measures the position of the head of a person in a box, by the depth of the face, or else by
+/// that of the torso.
 fn place(camera: &Camera, depth: &DepthImage, region: &Region) -> Option<Place> {
     let square = Rect::new(region.x, region.y, region.width, region.height);
     let face = depth.face_m(&square).filter(|depth_m| fits_box(camera, &square, *depth_m));
@@ -206,7 +206,8 @@ fn place(camera: &Camera, depth: &DepthImage, region: &Region) -> Option<Place> 
     Some(Place { head_in_camera_m, by_torso: face.is_none() })
 }
 
-/// A box says how far away its person is: another depth is that of an occluder, or of the wall.
+/// Returns true if a depth agrees with the size of a box; another depth is that of an occluder or
+/// of the background.
 fn fits_box(camera: &Camera, square: &Rect, depth_m: f64) -> bool {
     let by_size = camera.focal_px() * UPPER_BODY_SIDE_M / square.width.max(square.height);
     let ratio = depth_m / by_size;
@@ -216,23 +217,23 @@ fn fits_box(camera: &Camera, square: &Rect, depth_m: f64) -> bool {
 /// Returns the surface of the head of a person in a box at a depth, in the camera frame, m.
 fn head_at(camera: &Camera, square: &Rect, depth_m: f64) -> Option<[f64; 3]> {
     let centre = camera.robot_from_camera.inverse() * camera.head_of(square, depth_m);
-    // Annotations hold the surface; the centre lies behind it.
+    // Annotations contain the surface; the centre lies behind it.
     let ray = centre.coords.try_normalize(1e-6)?;
     Some(rounded(&(centre - ray * HEAD_RADIUS_M)))
 }
 
-/// Returns a place in whole millimetres.
+/// Returns a position in whole millimetres.
 fn rounded(point: &Point3<f64>) -> [f64; 3] {
     // Dividing gives the number nearest to three decimals, and adding 0 removes the sign of -0.
     [point.x, point.y, point.z].map(|v| (v * 1e3).round() / 1e3 + 0.0)
 }
 
-/// Compresses depth in whole millimetres; 0 is no reading.
+/// Compresses depth in whole millimetres; 0 means no reading.
 fn packed(depth: &DepthImage) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::with_capacity(2 * depth.pixels().len());
     for metres in depth.pixels() {
         let units = (metres / DEPTH_UNIT_M).round();
-        // NaN fails the comparison, too; depth beyond 65 m is as good as none.
+        // NaN fails the comparison, too; depth beyond 65 m counts as no reading.
         let is_known = (1.0..=f32::from(u16::MAX)).contains(&units);
         bytes.extend(if is_known { units as u16 } else { 0 }.to_le_bytes());
     }

@@ -1,9 +1,10 @@
-//! `tagalong annotate`: truth for one's own log.
+//! `tagalong annotate`: annotates the people in a log.
 //!
-//! A pipeline passes the log once and proposes tracks, while `film` keeps images and depth. Then
-//! `server` answers one page, on this computer alone: the page shows a frame and asks for changes,
-//! `document` makes them and takes them back, and `session` measures places by depth and writes the
-//! whole file after each. The page decides nothing, so that all of it can be tested without one.
+//! A pipeline processes the log once and proposes tracks, while `film` stores images and depth.
+//! Then `server` serves one page, on this computer only: the page shows a frame and requests
+//! changes, `document` makes and undoes them, and `session` measures positions with depth and
+//! writes the complete file after each change. The page has no logic of its own, so that everything
+//! can be tested without a browser.
 //!
 //! ```
 //! use clap::Parser as _;
@@ -55,10 +56,10 @@ use crate::person::{Person, sparse};
 use crate::server::App;
 use crate::session::{Session, read_people};
 
-/// Longest time without a detection over which a proposed person is taken to be there, s.
+/// Longest time without a detection over which a proposed person is assumed to be present, s.
 const BRIDGED_S: f64 = 2.0;
 
-/// Fewest detections of a proposed person.
+/// Least number of detections of a proposed person.
 const LEAST_DETECTIONS: usize = 3;
 
 /// Arguments of `tagalong annotate`.
@@ -72,7 +73,7 @@ pub struct AnnotateArgs {
     /// The file to write or to continue [default: LOG.people.csv].
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
-    /// Port of the page on this computer; 0 takes a free one.
+    /// Port of the page on this computer; 0 selects a free one.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub port: u16,
     /// Start without proposed tracks.
@@ -100,7 +101,7 @@ Examples:
 ///
 /// # Errors
 /// A log or a config that cannot be used, a log without images, a file that cannot be continued or
-/// written, a port that is taken.
+/// written, or a port that is in use.
 pub fn annotate(args: &AnnotateArgs, registry: &Registry) -> Outcome {
     let signals = Signals::listen()?;
     check_log_path(&args.log)?;
@@ -170,7 +171,7 @@ fn app(
     })
 }
 
-/// Refuses a file that could not be written, before an hour of work is put into it.
+/// Refuses a file that could not be written, before the user spends an hour on the annotation.
 fn check_writable(output: &Path) -> Result<(), Failure> {
     make_room_for(output)?;
     let shown = output.display();
@@ -184,7 +185,7 @@ fn check_writable(output: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// All that is taken from the log in one pass.
+/// Everything that one pass over the log yields.
 struct Material {
     film: Film,
     people: BTreeMap<i64, Person>,
@@ -252,7 +253,7 @@ fn check_images(log: &Path, film: &Film) -> Result<(), Failure> {
     )))
 }
 
-/// Boxes of the tracks by their numbers.
+/// Boxes of the tracks by their IDs.
 type Boxes = BTreeMap<u32, Vec<(u32, Region)>>;
 
 /// Pass over the log.
@@ -297,7 +298,7 @@ fn no_room(error: std::io::Error) -> Failure {
     ))
 }
 
-/// Says how many tracks are too short to be proposed.
+/// Reports the number of tracks that are too short to be proposed.
 fn hidden(short: usize) -> String {
     if short == 0 {
         return String::new();
@@ -305,8 +306,8 @@ fn hidden(short: usize) -> String {
     format!(", without {} of fewer than {LEAST_DETECTIONS} detections", counted(short, "track"))
 }
 
-/// Returns people with few keys from the boxes of tracks, numbered from 1 in the order in which they
-/// come.
+/// Returns people with few keys from the boxes of tracks, with IDs from 1 in the order of
+/// appearance.
 fn proposals(film: &Film, tracks: Boxes, proposer: &str) -> BTreeMap<i64, Person> {
     let mut tracks: Vec<_> = tracks.into_values().collect();
     tracks.retain(|boxes| boxes.len() >= LEAST_DETECTIONS);
@@ -325,7 +326,7 @@ fn proposal(film: &Film, boxes: &[(u32, Region)], proposer: &str) -> Person {
     Person::of(keys, &shown)
 }
 
-/// The time of a frame, in seconds; 0 where the film does not have it.
+/// Returns the time of a frame, s; 0 if the film does not have it.
 fn time_of(film: &Film, number: u32) -> f64 {
     film.shot(number).map_or(0.0, |shot| shot.t_s)
 }

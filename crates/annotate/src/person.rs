@@ -13,23 +13,23 @@ pub struct Key {
     pub region: Region,
     /// Visible fraction of the upper body.
     pub visible: f64,
-    /// Neither a miss nor a false alarm.
+    /// True if the person counts neither as a miss nor as a false positive.
     pub ignore: bool,
-    /// Occluder: `0` nothing, a person's id, `border` or `static`.
+    /// Occluder: `0` for none, the ID of a person, `border` or `static`.
     pub occluder: String,
     /// Visible part of the whole body, pixels.
     pub visible_body: Option<Region>,
-    /// Surface of the head in the camera frame as a file has it, m; measured anew once the box
+    /// Surface of the head in the camera frame from the file, m; it is measured again once the box
     /// moves.
     pub head_in_camera_m: Option<[f64; 3]>,
-    /// Origin of that place, as the file has it.
+    /// Origin of that position in the file.
     pub interpolated: u8,
-    /// Pipeline that proposed the box, until it is reviewed; empty then, and for boxes set by hand.
+    /// Pipeline that proposed the box; empty once it is reviewed, and for boxes set by hand.
     pub proposed: String,
 }
 
 impl Key {
-    /// Returns a wholly visible person in a box.
+    /// Returns a fully visible person in a box.
     pub fn new(region: Region) -> Self {
         Self {
             region: tenths(region),
@@ -43,7 +43,7 @@ impl Key {
         }
     }
 
-    /// Moves the box; what was measured in the old one goes.
+    /// Moves the box and discards the measurements in the old one.
     pub fn move_to(&mut self, region: Region) {
         self.region = tenths(region);
         self.visible_body = None;
@@ -53,8 +53,8 @@ impl Key {
     }
 }
 
-/// Returns a box in tenths of a pixel, which are finer than a hand: so the file has the same keys as
-/// the page, and what lies between them comes back the same.
+/// Returns a box rounded to tenths of a pixel, which is finer than manual precision, so that the
+/// keys in the file equal those on the page and give the same interpolated boxes.
 pub fn tenths(region: Region) -> Region {
     let [x, y, width, height] = [region.x, region.y, region.width, region.height]
         // Adding 0 removes the sign of -0.
@@ -64,7 +64,8 @@ pub fn tenths(region: Region) -> Region {
 
 /// Boxes of one person over time.
 ///
-/// Between two keys the box is interpolated, but for the `holes`: frames without the person.
+/// Between two keys the box is interpolated, except in the `holes`, which are frames without the
+/// person.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Person {
     keys: BTreeMap<u32, Key>,
@@ -72,7 +73,8 @@ pub struct Person {
 }
 
 impl Person {
-    /// Returns the person with these keys, who is in no frame between two keys that `shown` lacks.
+    /// Returns the person with these keys; frames between two keys that are not in `shown` are
+    /// holes.
     pub fn of(keys: BTreeMap<u32, Key>, shown: &BTreeSet<u32>) -> Self {
         let mut person = Self { keys, holes: BTreeSet::new() };
         let span = person.span();
@@ -87,7 +89,7 @@ impl Person {
         self.keys.is_empty()
     }
 
-    /// Returns the frames from the first key to the last; none without a key.
+    /// Returns the frames from the first key to the last; `None` without a key.
     fn span(&self) -> RangeInclusive<u32> {
         match (self.keys.first_key_value(), self.keys.last_key_value()) {
             (Some((first, _)), Some((last, _))) => *first..=*last,
@@ -106,7 +108,7 @@ impl Person {
         self.keys.get(&frame)
     }
 
-    /// Returns the person in a frame: the key, or what lies between two keys.
+    /// Returns the person in a frame: the key, or the interpolation between two keys.
     pub fn at(&self, frame: u32) -> Option<Key> {
         if let Some(key) = self.keys.get(&frame) {
             return Some(key.clone());
@@ -118,7 +120,7 @@ impl Person {
         let (after, new) = self.keys.range(frame..).next()?;
         let share = f64::from(frame - before) / f64::from(after - before);
         let region = between(&old.region, &new.region, share);
-        // The notes hold until the next key changes them.
+        // The attributes are valid until the next key changes them.
         let mut notes = Key { visible_body: None, head_in_camera_m: None, ..old.clone() };
         // The frames between two keys are reviewed if both of them are.
         if notes.proposed.is_empty() {
@@ -129,7 +131,7 @@ impl Person {
 
     /// Sets the key of a frame.
     pub fn set(&mut self, frame: u32, key: Key) {
-        // A key beyond the ends does not fill the frames that the person was not in.
+        // A key beyond the ends does not fill frames without the person.
         let old = self.span();
         self.holes.remove(&frame);
         self.keys.insert(frame, key);
@@ -143,7 +145,7 @@ impl Person {
         }
     }
 
-    /// Makes a key of an interpolated box; false if the frame has no box.
+    /// Turns an interpolated box into a key; returns false if the frame has no box.
     pub fn pin(&mut self, frame: u32) -> bool {
         let Some(mut key) = self.at(frame) else { return false };
         if let Entry::Vacant(place) = self.keys.entry(frame) {
@@ -153,7 +155,7 @@ impl Person {
         true
     }
 
-    /// Makes a reviewed key of the box of a frame.
+    /// Turns the box of a frame into a reviewed key.
     pub fn review(&mut self, frame: u32) {
         if self.pin(frame)
             && let Some(key) = self.keys.get_mut(&frame)
@@ -162,14 +164,14 @@ impl Person {
         }
     }
 
-    /// Takes a key back, so that the box is interpolated; at an end the person begins later or ends
-    /// earlier.
+    /// Removes a key, so that the box is interpolated; at an end, the person then begins later or
+    /// ends earlier.
     pub fn unpin(&mut self, frame: u32) {
         self.keys.remove(&frame);
         self.trim();
     }
 
-    /// Takes the person out of frames; the boxes in all others stay where they are.
+    /// Removes the person from frames; the boxes in all other frames do not change.
     pub fn remove(&mut self, frames: RangeInclusive<u32>) {
         for edge in [frames.start().checked_sub(1), frames.end().checked_add(1)] {
             edge.map(|edge| self.pin(edge));
@@ -182,7 +184,7 @@ impl Person {
         self.trim();
     }
 
-    /// Lets the person be in all frames between the keys around a frame.
+    /// Makes the person present in all frames between the keys around a frame.
     pub fn fill(&mut self, frame: u32) {
         let before = self.keys.range(..frame).next_back().map(|(frame, _)| *frame);
         let after = self.keys.range(frame..).next().map(|(frame, _)| *frame);
@@ -191,7 +193,7 @@ impl Person {
         }
     }
 
-    /// Splits off the frames from `frame` on; no box moves.
+    /// Splits off the frames from `frame` on; boxes do not change.
     #[must_use]
     pub fn split_off(&mut self, frame: u32) -> Self {
         self.pin_edges();
@@ -212,7 +214,7 @@ impl Person {
         other.frames().any(|frame| frames.contains(&frame))
     }
 
-    /// Adds the boxes of another person, in none of the same frames; no box moves.
+    /// Adds the boxes of another person with no frame in common; boxes do not change.
     pub fn join(&mut self, mut other: Self) {
         self.pin_edges();
         other.pin_edges();
@@ -222,7 +224,8 @@ impl Person {
         *self = Self::of(keys, &shown);
     }
 
-    /// Makes keys of all boxes beside a frame without one, so that new neighbours do not move them.
+    /// Turns all boxes next to a frame without one into keys, so that new neighbours do not move
+    /// them.
     fn pin_edges(&mut self) {
         let beside = self.holes.iter().flat_map(|hole| [hole.saturating_sub(1), hole + 1]);
         let edges: Vec<u32> = beside.filter(|frame| !self.holes.contains(frame)).collect();
@@ -238,10 +241,10 @@ impl Person {
     }
 }
 
-/// Longest pause between two keys over which the person is taken to be there, frames.
+/// Longest gap between two keys over which the person is assumed to be present, frames.
 const JOINED_FRAMES: u32 = 30;
 
-/// Returns the region that is a share of the way from one to another.
+/// Returns the region at a fraction of the way from one to another.
 fn between(from: &Region, to: &Region, share: f64) -> Region {
     Region {
         x: from.x + (to.x - from.x) * share,
@@ -251,11 +254,11 @@ fn between(from: &Region, to: &Region, share: f64) -> Region {
     }
 }
 
-/// Fraction of a box's width by which an interpolated box may be off a proposed one.
+/// Largest deviation of an interpolated box from a proposed one, as a fraction of its width.
 const TOLERANCE: f64 = 0.04;
 
-/// Returns as few keys as bring all boxes back by interpolation, to within a twenty-fifth of their
-/// width.
+/// Returns as few keys as possible with which interpolation reproduces all boxes to within a
+/// twenty-fifth of their width.
 pub fn sparse(boxes: &[(u32, Region)]) -> BTreeMap<u32, Key> {
     let mut keys = BTreeMap::new();
     let (Some(first), Some(last)) = (boxes.first(), boxes.last()) else { return keys };
@@ -272,7 +275,8 @@ pub fn sparse(boxes: &[(u32, Region)]) -> BTreeMap<u32, Key> {
     keys
 }
 
-/// Returns by how much of its width a box is off the line between the ends of its part.
+/// Returns the deviation of a box from the interpolation between the ends of its part, as a
+/// fraction of its width.
 fn off(part: &[(u32, Region)], at: usize) -> f64 {
     let ((first, from), (last, to), (frame, region)) = (part[0], part[part.len() - 1], part[at]);
     let share = f64::from(frame - first) / f64::from((last - first).max(1));

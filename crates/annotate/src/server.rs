@@ -17,7 +17,7 @@ const SCRIPT: &str = include_str!("page/page.js");
 const STYLE: &str = include_str!("page/page.css");
 const ICON: &str = include_str!("page/icon.svg");
 
-/// Everything that answers need.
+/// State of the server.
 pub struct App {
     /// Images.
     pub film: Arc<Film>,
@@ -25,9 +25,9 @@ pub struct App {
     pub session: Mutex<Session>,
     /// The log.
     pub log: PathBuf,
-    /// Origin of the first boxes, in words.
+    /// Origin of the initial boxes, in words.
     pub origin: String,
-    /// True after the page was told that all is done.
+    /// True after the page has been told that the annotation is finished.
     pub finished: AtomicBool,
 }
 

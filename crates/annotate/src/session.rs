@@ -1,4 +1,4 @@
-//! The annotation of one log: film, people, and the file that follows every change.
+//! The annotation of one log: film, people, and the file that is written after every change.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
@@ -17,33 +17,33 @@ use crate::document::{Change, Document};
 use crate::film::{Film, Place};
 use crate::person::{Key, Person, tenths};
 
-/// A person in a frame, as the page takes it: frame, box, then 1 for a key, 1 for ignored, the
-/// visible fraction, the distance, m, or null, and 1 for a proposed box that is not reviewed.
+/// A person in a frame in the format of the page: frame, box, 1 for a key, 1 for ignored, the
+/// visible fraction, the distance in m or null, and 1 for a proposed box that is not reviewed.
 type PageRow = (u32, [f64; 4], u8, u8, f64, Option<f64>, u8);
 
-/// Answer to a change, and the state at the beginning.
+/// Answer to a change, also used for the initial state.
 #[derive(Debug, Serialize)]
 pub struct Answer {
-    /// Boxes of the people that changed; none for a person that is gone.
+    /// Boxes of the people that changed; empty for a person that was removed.
     pub people: BTreeMap<i64, Option<Vec<PageRow>>>,
     /// True if there is a change to undo.
     pub undo: bool,
-    /// True if there is one to make again.
+    /// True if there is a change to redo.
     pub redo: bool,
     /// Person of a new box.
     pub select: Option<i64>,
-    /// True if the file has all of it.
+    /// True if everything is saved.
     pub saved: bool,
 }
 
-/// Content of the page that does not change.
+/// Constant content of the page.
 #[derive(Debug, Serialize)]
 pub struct About {
     /// Name of the log.
     pub log: String,
     /// The file that is written.
     pub file: String,
-    /// Origin of the first boxes, in words.
+    /// Origin of the initial boxes, in words.
     pub origin: String,
     /// Numbers of the frames.
     pub frames: Vec<u32>,
@@ -51,7 +51,7 @@ pub struct About {
     pub t: Vec<f64>,
     /// Width and height of the images, pixels.
     pub size: [usize; 2],
-    /// True if places come from depth.
+    /// True if positions come from depth.
     pub depth: bool,
 }
 
@@ -61,15 +61,16 @@ pub struct Session {
     film: Arc<Film>,
     document: Document,
     output: PathBuf,
-    /// Places that were measured, with the boxes that they are of.
+    /// Measured positions with the boxes in which they were measured.
     places: BTreeMap<(i64, u32), (Region, Option<Place>)>,
-    /// The file as this session knows it: its length and time; none if there was none.
+    /// Length and time of the file when this session last read or wrote it; `None` if there was
+    /// none.
     known: Option<(u64, SystemTime)>,
     saved: bool,
 }
 
 impl Session {
-    /// Begins with some people; `output` is written after the first change.
+    /// Starts with some people; `output` is written after the first change.
     pub fn new(film: Arc<Film>, people: BTreeMap<i64, Person>, output: PathBuf) -> Self {
         let known = stamp_of(&output);
         let saved = known.is_some();
@@ -77,7 +78,8 @@ impl Session {
         Self { film, document, output, places: BTreeMap::new(), known, saved }
     }
 
-    /// Measures the places of all people, frame by frame, so that later changes measure little.
+    /// Measures the positions of all people, frame by frame, so that later changes have little to
+    /// measure.
     pub fn measure(&mut self, mut told: impl FnMut(f64, u32)) {
         let film = Arc::clone(&self.film);
         let count = film.shots().len().max(1) as f64;
@@ -97,7 +99,7 @@ impl Session {
         }
     }
 
-    /// Returns what the page needs to know once.
+    /// Returns the constant content of the page.
     pub fn about(&self, log: &Path, origin: &str) -> About {
         let shots = self.film.shots();
         let size = shots.first().map_or([0, 0], |shot| [shot.camera.width, shot.camera.height]);
@@ -121,8 +123,8 @@ impl Session {
     /// Makes a change and saves the file.
     ///
     /// # Errors
-    /// A sentence for the user: a change that makes no sense, a file that cannot be written or that
-    /// another program has changed.
+    /// A sentence for the user: an invalid change, or a file that cannot be written or that another
+    /// program has changed.
     pub fn apply(&mut self, change: &Change) -> Result<Answer, String> {
         self.check_file()?;
         let change = self.resolved(change)?;
@@ -168,7 +170,7 @@ impl Session {
         Ok(Change::Box { frame, id: *id, region })
     }
 
-    /// Returns the box of a person in a frame or in the nearest one before it.
+    /// Returns the box of a person in a frame, or in the nearest earlier one.
     fn latest(&self, id: i64, frame: u32) -> Option<Region> {
         let person = self.document.people().get(&id)?;
         let before = person.frames().take_while(|at| *at <= frame).last();
@@ -200,7 +202,7 @@ impl Session {
         Some(rows.collect::<Vec<_>>())
     }
 
-    /// Returns the place of a person, measured where the file had none, and its origin.
+    /// Returns the position of a person and its origin; it is measured if the file had none.
     fn head(&mut self, id: i64, number: u32, key: &Key) -> Option<([f64; 3], u8)> {
         if let Some(head) = key.head_in_camera_m {
             return Some((head, key.interpolated));
@@ -217,7 +219,7 @@ impl Session {
         place.map(|place| (place.head_in_camera_m, if place.by_torso { 2 } else { 0 }))
     }
 
-    /// Returns the rows of the file, by frame and number.
+    /// Returns the rows of the file, ordered by frame and ID.
     fn rows(&mut self) -> Vec<Row> {
         let people = self.document.people().clone();
         let mut rows = Vec::new();
@@ -238,7 +240,7 @@ impl Session {
         let region = if is_key { found.region } else { tenths(found.region) };
         let region = clipped(region, camera.width, camera.height)?;
         let head = self.head(id, number, &found);
-        // 1 is the word for boxes and places that were not measured.
+        // The file has 1 for boxes and positions that were not measured.
         let measured = head.map_or(1, |(_, origin)| origin);
         Some(Row {
             frame: number,
@@ -255,12 +257,13 @@ impl Session {
         })
     }
 
-    /// Fills in the places of a person that depth does not show, hidden behind another one say: the
-    /// depth changes evenly between the places that were measured, and as the size of the box does.
+    /// Fills in the positions of a person in frames where depth does not show the person, for
+    /// example behind another one. The depth is interpolated between the measured positions,
+    /// relative to the depth by the size of the box.
     fn fill_places(&self, person: &Person, rows: &mut [Row]) {
         let known: Vec<(u32, f64)> = rows
             .iter()
-            // Places that were filled in before are none to begin with.
+            // Positions that were filled in before do not count as measured.
             .filter(|row| row.interpolated != 1 || !row.key)
             .filter_map(|row| {
                 let size = person.at(row.frame).map_or(0.0, |key| key.region.width);
@@ -290,7 +293,7 @@ impl Session {
         ))
     }
 
-    /// Writes the file: whole or not at all.
+    /// Writes the file atomically.
     ///
     /// # Errors
     /// A sentence that names the file.
@@ -305,7 +308,7 @@ impl Session {
     }
 }
 
-/// Returns the value of a frame between those that are known, or that of the nearest one.
+/// Returns the value of a frame, interpolated between known frames, or that of the nearest one.
 fn at_frame(known: &[(u32, f64)], frame: u32) -> Option<f64> {
     let after = known.partition_point(|(other, _)| *other < frame);
     let before = after.checked_sub(1).and_then(|at| known.get(at));
@@ -318,8 +321,8 @@ fn at_frame(known: &[(u32, f64)], frame: u32) -> Option<f64> {
     }
 }
 
-/// Returns the part of a box inside the image, in tenths of a pixel where it is cut; none if there is
-/// none.
+/// Returns the part of a box inside the image, in tenths of a pixel where it is cut; `None` if
+/// there is none.
 fn clipped(region: Region, columns: usize, rows: usize) -> Option<Region> {
     let right = (region.x + region.width).min(columns as f64);
     let bottom = (region.y + region.height).min(rows as f64);
@@ -336,7 +339,8 @@ fn stamp_of(path: &Path) -> Option<(u64, SystemTime)> {
     Some((about.len(), about.modified().ok()?))
 }
 
-/// Writes beside the file first, so that a kill at any moment leaves the old one or the new one.
+/// Writes to a temporary file beside the file first, so that a kill at any time leaves the old or
+/// the new file.
 fn write_whole(path: &Path, rows: &[Row]) -> io::Result<()> {
     let mut name = path.as_os_str().to_owned();
     name.push(".partial");
@@ -352,7 +356,7 @@ fn write_whole(path: &Path, rows: &[Row]) -> io::Result<()> {
 ///
 /// # Errors
 /// A sentence that names the file: a line that cannot be read, a frame that the log does not have,
-/// a person twice in a frame.
+/// or a person twice in a frame.
 pub fn read_people(path: &Path, film: &Film) -> Result<BTreeMap<i64, Person>, String> {
     let name = path.display().to_string();
     let text = read_text(path, FileLimit::Table)
@@ -381,7 +385,7 @@ pub fn read_people(path: &Path, film: &Film) -> Result<BTreeMap<i64, Person>, St
         .collect())
 }
 
-/// Returns the key of a row; none for a place behind the camera.
+/// Returns the key of a row; `None` for a position behind the camera.
 fn key_of(row: Row, film: &Film) -> Option<Key> {
     let camera = &film.shot(row.frame)?.camera;
     let region = match &row.upper_body {
@@ -400,7 +404,7 @@ fn key_of(row: Row, film: &Film) -> Option<Key> {
     })
 }
 
-/// Returns the whole square of a box of which the file has the part inside the image.
+/// Returns the complete square of a box that the file has cut off at the image border.
 fn squared(region: &Region, columns: f64, rows: f64) -> Region {
     let Region { mut x, mut y, mut width, mut height } = *region;
     let side = width.max(height);
@@ -448,7 +452,7 @@ mod tests {
         assert!(rows.iter().all(|row| row.head_in_camera_m.is_some()), "depth fills the place in");
         let keys: Vec<_> = rows.iter().map(|row| (row.key, row.interpolated)).collect();
         assert_eq!((keys[0], keys[1]), ((true, 0), (false, 1)));
-        // Another program goes on where this one was killed.
+        // Another process continues where this one was killed.
         let people = read_people(&path, &film(12)).unwrap();
         let mut second = Session::new(Arc::new(film(12)), people, path.clone());
         second.apply(&Change::Note { frame: 9, id: 1, ignore: Some(true), visible: None }).unwrap();

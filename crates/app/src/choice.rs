@@ -98,6 +98,8 @@ pub struct Fittings {
     pub account: InputAccount,
     /// Pipelines that were tried and do not fit.
     refusals: Vec<Refusal>,
+    /// True for a log without a message.
+    is_empty: bool,
     /// A line about lost data; empty for an intact log.
     damage: String,
     /// Camera that the user named.
@@ -152,6 +154,9 @@ impl Fittings {
     /// Returns the reason of all refusals, if it is the same for all, as for a file that is not a
     /// log.
     fn common_reason(&self) -> Option<&str> {
+        if self.is_empty {
+            return Some("the log has no messages");
+        }
         let (first, others) = self.refusals.split_first()?;
         let is_common = others.iter().all(|other| other.why == first.why);
         (is_common && !others.is_empty()).then_some(&*first.why)
@@ -163,6 +168,10 @@ impl Fittings {
         let usable = self.account.usable();
         // "Alone" is said only if there is nothing else.
         let is_alone = self.account.topics.len() == usable.len();
+        let missing = self.account.curable().filter_map(|topic| topic.could_be);
+        let missing = missing.filter(|input| !usable.contains(input));
+        let mut unusable: Vec<&str> = missing.map(words_of).collect();
+        unusable.dedup();
         let usable: Vec<&str> = usable.into_iter().map(words_of).collect();
         let usable = match usable.split_last() {
             None => "nothing usable".to_owned(),
@@ -170,9 +179,6 @@ impl Fittings {
             Some((last, [])) => (*last).to_owned(),
             Some((last, others)) => format!("{} and {last}", others.join(", ")),
         };
-        let mut unusable: Vec<&str> =
-            self.account.curable().filter_map(|topic| topic.could_be).map(words_of).collect();
-        unusable.dedup();
         if unusable.is_empty() {
             usable
         } else {
@@ -272,6 +278,7 @@ pub fn fitting(log: &Path, registry: &Registry, args: &InputArgs, most: usize) -
     // If a log cannot be read, the trials report the reason.
     if let Ok(inspected) = tagalong_log::inspect(log, &input, &Limits::default()) {
         found.damage = damage(&inspected);
+        found.is_empty = inspected.topics.iter().all(|topic| topic.count == 0);
         found.account = inspected.inputs;
     }
     // Pipelines for depth that are made for a camera at another height.
@@ -384,6 +391,40 @@ mod tests {
         let found = Fittings { refusals: vec![refusal], ..Fittings::default() };
         assert_eq!(found.without_network().as_deref(), Some(why));
         assert_eq!(Fittings::default().without_network(), None, "it would see nothing");
+    }
+
+    #[test]
+    fn of_a_log_without_messages_that_is_the_reason() {
+        let folder = tempfile::tempdir().unwrap();
+        let log = folder.path().join("empty.mcap");
+        std::fs::write(&log, b"\x89MCAP0\r\n").unwrap();
+        let found = fitting(&log, &Registry::default(), &InputArgs::default(), 1);
+        let message = found.none_fits(&log).message;
+        assert!(message.contains("empty.mcap: the log has no messages"), "{message}");
+        assert!(!message.contains("no built-in pipeline fits"), "{message}");
+    }
+
+    #[test]
+    fn a_scanner_that_cannot_be_used_beside_another_leaves_the_log_with_scans() {
+        let front = tagalong_log::TopicUse {
+            topic: "/scan".to_owned(),
+            kind: "sensor_msgs/LaserScan".to_owned(),
+            camera: None,
+            used_as: Some("laser".to_owned()),
+            calibration: None,
+            problem: None,
+            could_be: None,
+            remedy: None,
+        };
+        let rear = tagalong_log::TopicUse {
+            used_as: None,
+            problem: Some("angle_increment is 0".to_owned()),
+            could_be: Some("laser"),
+            ..front.clone()
+        };
+        let mut found = Fittings::default();
+        found.account.topics = vec![front, rear];
+        assert_eq!(found.contents(), "laser scans");
     }
 
     #[test]

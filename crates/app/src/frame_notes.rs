@@ -81,6 +81,9 @@ pub struct DriveNote {
     /// empty without one.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub cause: String,
+    /// True if the images are frozen and show an earlier time.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub shows_past: bool,
     /// Commanded speed, m/s.
     pub forward_mps: f64,
     /// Commanded turn rate, positive to the left, rad/s.
@@ -246,6 +249,7 @@ impl DriveNote {
             reason: command.reason.name().to_owned(),
             reason_about: command.about(),
             cause: report.cause.as_ref().map(ToString::to_string).unwrap_or_default(),
+            shows_past: report.shows_past(),
             forward_mps: rounded(twist.linear_mps, 1e3),
             turn_rps: rounded(twist.angular_rps, 1e3),
             motion: command.effect().to_owned(),

@@ -33,6 +33,7 @@ pub fn ranking(benchmark: &Benchmark) -> String {
             .collect();
         // A mean over fewer logs, which may be the easier ones, is not comparable.
         let most = ranked.iter().map(|(.., logs)| *logs).max().unwrap_or(0);
+        let fewer = fewer_logs(&ranked, most);
         ranked.retain(|(.., logs)| *logs == most);
         ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
         if ranked.is_empty() || most < 2 && ranked.len() < 2 {
@@ -52,9 +53,21 @@ pub fn ranking(benchmark: &Benchmark) -> String {
         if let [first, second, ..] = &ranked[..] {
             out += &verdict(&summary, key, [&first.0.pipeline, &second.0.pipeline]);
         }
+        out += &fewer;
         break;
     }
     out
+}
+
+/// Names the pipelines that have fewer logs than others, and so no place among them.
+fn fewer_logs(pipelines: &[(&PipelineSummary, f64, u64)], most: u64) -> String {
+    let fewer = pipelines.iter().filter(|(.., logs)| *logs < most);
+    let named: Vec<String> =
+        fewer.map(|(p, mean, logs)| format!("{} {mean:.3} ({logs})", p.pipeline)).collect();
+    if named.is_empty() {
+        return String::new();
+    }
+    format!("not ranked, because of fewer logs, with their number: {}\n", named.join(", "))
 }
 
 /// States whether two pipelines differ significantly, or how many logs that takes.
@@ -203,6 +216,17 @@ mod tests {
             ranking(&Benchmark { tasks: vec![scored("a", "x", 0.5)], ..Benchmark::default() }),
             ""
         );
+    }
+
+    #[test]
+    fn a_pipeline_with_fewer_logs_is_named_beside_the_ranking() {
+        assert!(!ranking(&two(3)).contains("not ranked"));
+        let mut benchmark = two(3);
+        benchmark.tasks.push(scored("c", "log 1", 0.9));
+        let told = ranking(&benchmark);
+        assert!(told.contains("mean over 3 logs of equal weight: a 0.700, b"), "{told}");
+        let fewer = "not ranked, because of fewer logs, with their number: c 0.900 (1)\n";
+        assert!(told.ends_with(fewer), "{told}");
     }
 
     #[test]

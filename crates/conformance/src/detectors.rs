@@ -9,6 +9,7 @@ use tagalong_core::{
 use tagalong_geometry::Camera;
 
 use crate::figure::Figure;
+use crate::findings::{Findings, corners};
 use crate::scenes::{bare_frame, drawn, level, mountings, odd_frames, required, restricted, track};
 use crate::subject::{From, Subject};
 use crate::verdict::{Check, Verdict, demand};
@@ -324,11 +325,14 @@ fn person_is_found(subject: &Subject<'_>) -> Verdict {
             let mut figure = Figure::at(2.0, 0.1);
             figure.heading_rad += turned_rad;
             let scene = format!("camera {name}, person turned by {turned_rad:.1} rad");
-            let found = people(detector, &drawn(1, &camera, &[figure]), &EVERYWHERE)?;
-            let believed: Vec<_> = found.into_iter().filter(|d| d.score > 0.0).collect();
+            let frame = drawn(1, &camera, &[figure]);
+            let findings = Findings::ask(detector, &frame, &EVERYWHERE, figure)?;
             // Other candidates are allowed if they are not more likely people than not.
-            demand(believed.len() == 1, || format!("{scene}: {} found", believed.len()))?;
-            is_at(&believed[0], &figure, &camera).map_err(|what| format!("{scene}: {what}"))?;
+            let believed = findings.believed();
+            demand(believed.len() == 1, || {
+                format!("{scene}: {} found: {}", believed.len(), findings.words())
+            })?;
+            is_at(believed[0], &figure, &camera).map_err(|what| format!("{scene}: {what}"))?;
         }
     }
     Ok(())
@@ -342,7 +346,12 @@ fn is_at(found: &Detection, figure: &Figure, camera: &Camera) -> Verdict {
     })?;
     let truth = camera.upper_body(&figure.head).clipped(camera.width, camera.height);
     let iou = found.rect_in(camera).clipped(camera.width, camera.height).iou(&truth);
-    demand(iou >= 0.5, || format!("the region overlaps the upper body by {iou:.2} only"))
+    demand(iou >= 0.5, || {
+        let [is, should] = [found.rect_in(camera), truth].map(|region| corners(&region));
+        format!(
+            "the region is {is}; that of the upper body is {should}, overlap {iou:.2} of at least 0.5"
+        )
+    })
 }
 
 fn person_is_followed(subject: &Subject<'_>) -> Verdict {
@@ -360,8 +369,10 @@ fn person_is_followed(subject: &Subject<'_>) -> Verdict {
         // The predicted position is wrong by 10 cm, so that the detector has to search.
         followed.estimate.person.position.y -= 0.1;
         followed.estimate.region = camera.upper_body(&followed.estimate.person.position);
-        let found = people(detector, &drawn(2, &camera, &[figure]), &Query::Track(&followed))?;
-        let best = found.first().ok_or_else(|| format!("camera {name}: nobody is found"))?;
+        let frame = drawn(2, &camera, &[figure]);
+        let findings = Findings::ask(detector, &frame, &Query::Track(&followed), figure)?;
+        let best = findings.found.first();
+        let best = best.ok_or_else(|| format!("camera {name}: 0 found: {}", findings.words()))?;
         is_at(best, &figure, &camera).map_err(|what| format!("camera {name}: {what}"))?;
     }
     Ok(())

@@ -19,6 +19,7 @@ mod controllers;
 mod detectors;
 pub mod figure;
 mod filters;
+mod findings;
 mod general;
 mod likelihoods;
 mod managers;

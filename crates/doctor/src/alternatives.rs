@@ -1,4 +1,4 @@
-//! Other settings, tried on the same frames: how the figures of a pipeline would have changed.
+//! Other settings, tried on the same frames, and the change of the figures of a pipeline with each.
 
 use tagalong_app::choice::fitting;
 use tagalong_app::config_file::ConfigFile;
@@ -13,17 +13,17 @@ use toml::Table;
 use super::coverage::{Alternative, Course, Coverage};
 use super::visit::{Scope, Visit};
 
-/// Most built-in configs that are tried beside the one of the user.
+/// Largest number of built-in configs that are tried in addition to that of the user.
 const MOST_CONFIGS: usize = 4;
 
-/// Pipeline with another setting, on its way over the log.
+/// Pipeline with another setting, during the pass over the log.
 struct Runner {
     change: String,
     pipeline: Pipeline,
     course: Course,
 }
 
-/// Tries other settings on the frames of a visit, the best first.
+/// Tries other settings on the frames of a visit.
 pub fn tried(visit: &Visit, scope: Scope, registry: &Registry) -> Vec<Alternative> {
     let mut runners = runners(visit, scope, registry);
     let inputs =
@@ -36,7 +36,7 @@ pub fn tried(visit: &Visit, scope: Scope, registry: &Registry) -> Vec<Alternativ
     let progress = Progress::titled(&format!("{} other settings", runners.len()));
     for number in 0..scope.frames {
         let Some(item) = frames.next_frame() else { break };
-        // A pipeline that fails on this log is no alternative.
+        // A pipeline that fails on this log is not an alternative.
         runners.retain_mut(|runner| runner.step(&item));
         progress.advance(frames.progress(), number);
     }
@@ -47,7 +47,7 @@ pub fn tried(visit: &Visit, scope: Scope, registry: &Registry) -> Vec<Alternativ
     ranked(judged)
 }
 
-/// Returns alternatives, the best first; of equal ones the order stays.
+/// Returns the alternatives, the best first; equal ones keep their order.
 pub fn ranked(alternatives: impl Iterator<Item = Alternative>) -> Vec<Alternative> {
     let mut ranked: Vec<Alternative> = alternatives.collect();
     ranked.sort_by(|a, b| b.coverage.worth().total_cmp(&a.coverage.worth()));
@@ -60,7 +60,7 @@ impl Runner {
         Self { change, pipeline, course: Course::default() }
     }
 
-    /// Passes a frame on; returns false after an error.
+    /// Passes a frame to the pipeline; returns false after an error.
     fn step(&mut self, item: &LogFrame) -> bool {
         let report = self.pipeline.step(&item.frame);
         report.is_ok_and(|report| {
@@ -83,8 +83,8 @@ fn runners(visit: &Visit, scope: Scope, registry: &Registry) -> Vec<Runner> {
     built.chain(others(&visit.config, scope, registry)).collect()
 }
 
-/// Returns the changes that are tried: the values of `[tune]` and those that the table of remedies
-/// offers, none of them equal to the present one.
+/// Returns the changes to try: the values of `[tune]` and those in the table of remedies that
+/// differ from the present ones.
 fn changes(visit: &Visit, resolved: &Table, remedies: &Remedies) -> Vec<Change> {
     let tuned = visit.tunables.iter().flat_map(|tunable| {
         let others = tunable.values.iter().filter(|value| !is_present(value, &tunable.now));
@@ -99,7 +99,7 @@ fn changes(visit: &Visit, resolved: &Table, remedies: &Remedies) -> Vec<Change> 
     changes
 }
 
-/// Names another config as a change.
+/// Returns the name of another config in the form of a change.
 pub fn another(config: &str) -> String {
     format!("{config} (another config)")
 }

@@ -8,13 +8,13 @@ use tagalong_app::input_args::InputArgs;
 #[derive(Args, Debug)]
 #[command(allow_missing_positional = true)]
 pub struct DoctorArgs {
-    /// The pipeline, a TOML file or the name of a built-in one [default: the recommended ones that
-    /// fit the log, in turn].
+    /// The pipeline, a TOML file or the name of a built-in one [default: each recommended one that
+    /// fits the log].
     pub config: Option<PathBuf>,
     /// The log: MCAP, `.db3`, `.bag`, or the folder of a bag.
     #[arg(required = true)]
     pub log: PathBuf,
-    /// Write pictures into this folder: frames with their tracks, and the candidates that each test
+    /// Write pictures into this folder: frames with their tracks, and candidates that each test
     /// dropped.
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
@@ -24,21 +24,21 @@ pub struct DoctorArgs {
     /// Number of frames to examine, from the first one on.
     #[arg(long, value_name = "N", default_value_t = 300, value_parser = clap::value_parser!(u64).range(1..))]
     pub frames: u64,
-    /// Try other settings on this log, and print what each would have changed.
+    /// Try other settings on this log, and print the changes with each.
     #[arg(long, value_enum, default_value_t)]
     pub settings: Trying,
     /// Output format.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
-    /// Way in which the log is read.
+    /// Options for reading the log.
     #[command(flatten)]
     pub input: InputArgs,
 }
 
-/// Occasion for trying other settings.
+/// Condition for trying other settings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Trying {
-    /// If tracks and shapes that come and go disagree.
+    /// If the tracks disagree with the shapes that come and go.
     #[default]
     Auto,
     /// Always.

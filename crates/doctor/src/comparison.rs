@@ -1,4 +1,4 @@
-//! All built-in pipelines that fit a log, side by side.
+//! Comparison of all built-in pipelines that fit a log.
 
 use tagalong_app::choice::{CHOICES, Fitting, fitting};
 use tagalong_app::outcome::Failure;
@@ -10,11 +10,11 @@ use super::diagnosis::{Diagnosis, Row};
 use super::visit::{Scope, Visit};
 use super::{alternatives, further, snapshots};
 
-/// Visits a log with each pipeline that fits it; the findings are those of the first, which
-/// `tagalong run` takes.
+/// Visits a log with each pipeline that fits it; the findings are those of the first one, which
+/// `tagalong run` selects.
 ///
 /// # Errors
-/// A log that no pipeline fits; a folder that cannot be written.
+/// A log that no pipeline fits, or a folder that cannot be written.
 pub fn compare(args: &DoctorArgs, scope: Scope, registry: &Registry) -> Result<Diagnosis, Failure> {
     let found = fitting(scope.log, registry, scope.input, CHOICES.len());
     if found.fitting.is_empty() {
@@ -26,9 +26,9 @@ pub fn compare(args: &DoctorArgs, scope: Scope, registry: &Registry) -> Result<D
     let mut rows = Vec::new();
     let mut first = None;
     for Fitting { choice, config } in found.fitting {
-        // The checks are those of the first.
+        // Only the checks of the first pipeline are reported.
         let scope = Scope { with_samples: first.is_none(), ..scope };
-        // That of an installed network has the name by which `run` takes it.
+        // The config of an installed network gets the name that `run` accepts.
         let name = config.stem();
         let visit = Visit::make(config, scope, registry)?;
         if let Some(folder) = &args.output {

@@ -1,4 +1,4 @@
-//! Result of the doctor, as it is printed.
+//! Result of the doctor for printing.
 
 use std::path::{Path, PathBuf};
 
@@ -30,16 +30,16 @@ pub struct Diagnosis {
     /// Median time from one frame of the log to the next, ms.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub period_ms: Option<f64>,
-    /// All pipelines that fit the log, where no config was given.
+    /// All pipelines that fit the log, if no config was given.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pipelines: Vec<Row>,
     /// Inputs that the log has, in words.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub contents: String,
-    /// Better pipeline that a topic would make possible, with the remedy.
+    /// Better pipeline that an unused topic would make possible, with the remedy.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub better: Option<String>,
-    /// Reason why no pipeline with a neural network is compared, with the remedy.
+    /// Reason for comparing no pipeline with a neural network, with the remedy.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub network: Option<String>,
     /// Use of each image, scan, detection and odometry topic, with the reasons for those not used.
@@ -48,16 +48,16 @@ pub struct Diagnosis {
     pub findings: Vec<Finding>,
     /// Figures of the pipeline.
     pub coverage: Coverage,
-    /// Other settings, tried on the log.
+    /// Other settings that were tried on the log.
     pub alternatives: Vec<Alternative>,
-    /// Folder of the pictures of frames, or of a folder for each pipeline.
+    /// Folder with the pictures of frames, or with a folder for each pipeline.
     #[serde(serialize_with = "path_text::optional::serialize")]
     pub pictures: Option<PathBuf>,
     /// Tests of the rejection funnel.
     pub funnel: Vec<Drop>,
 }
 
-/// Line of the rejection funnel.
+/// Entry of the rejection funnel.
 #[derive(Debug, Serialize)]
 pub struct Drop {
     /// Name of the test.
@@ -68,7 +68,7 @@ pub struct Drop {
     pub look: Option<String>,
     /// Settings that belong to it, with their present values.
     pub settings: Vec<String>,
-    /// Sentence with the meaning of the test and two settings at most.
+    /// Sentence with the meaning of the test and at most two settings.
     pub why: String,
     /// Pictures of the dropped candidates.
     pub pictures: Option<PathBuf>,
@@ -79,15 +79,15 @@ pub struct Drop {
 pub struct Row {
     /// Name of the built-in config, or of the installed network.
     pub config: String,
-    /// True for the one that `tagalong run` takes.
+    /// True for the pipeline that `tagalong run` selects.
     pub taken: bool,
     /// Reason for the choice of such a pipeline.
     pub reason: &'static str,
     /// Figures on the log.
     pub coverage: Coverage,
-    /// Mean time of a frame, ms.
+    /// Mean time per frame, ms.
     pub frame_ms: f64,
-    /// Error of a plugin that ended it.
+    /// Error of a plugin that ended the run.
     pub failure: Option<String>,
 }
 
@@ -104,7 +104,7 @@ impl Row {
         }
     }
 
-    /// Returns the pipeline as an alternative to the one that is taken.
+    /// Returns the pipeline as an alternative to the selected one.
     pub fn alternative(&self) -> Alternative {
         Alternative { change: alternatives::another(&self.config), coverage: self.coverage.clone() }
     }
@@ -125,8 +125,7 @@ impl Diagnosis {
         let evidence = &visit.evidence;
         let resolved = visit.outer.resolved_with(visit.pipeline.config())?;
         let resolved = resolved.values();
-        let found = checks::ALL.iter().filter_map(|check| check(evidence));
-        let findings = found.map(|finding| Finding {
+        let findings = checks::findings(evidence).into_iter().map(|finding| Finding {
             remedy: finding.remedy.as_deref().and_then(|text| present::differing(text, resolved)),
             ..finding
         });
@@ -145,7 +144,7 @@ impl Diagnosis {
     }
 }
 
-/// Returns the tests by the number of dropped candidates, most first, with the remedies.
+/// Returns the tests in descending order of dropped candidates, with the remedies.
 fn funnel(
     visit: &Visit,
     resolved: &toml::Table,

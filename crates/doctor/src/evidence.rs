@@ -1,4 +1,4 @@
-//! Input of the checks: gathered once, in one pass over the frames.
+//! Input of the checks, collected in one pass over the frames.
 
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
@@ -19,14 +19,14 @@ use super::coverage::{Alternative, Coverage};
 use super::depth_unit::JudgedDepth;
 use super::trial::Trial;
 
-/// Number of measured frames, spread over those that are read.
+/// Largest number of measured frames, spread over the frames that are read.
 const SAMPLES: u64 = 24;
 
-/// Number of depth images that are kept for a summary.
+/// Largest number of depth images that are kept for a summary.
 const KEPT_DEPTHS: usize = 8;
 
-/// Way, m, and angle, rad, beyond which the camera moves on the robot: a floor that is measured at each
-/// frame, or a loose joint, gives less.
+/// Displacement, m, and angle, rad, above which the camera counts as moving on the robot: the noise
+/// of a floor that is measured at each frame, or a loose joint, gives less.
 const CAMERA_MOVED_M: f64 = 0.05;
 const CAMERA_TURNED_RAD: f64 = 0.05;
 
@@ -36,46 +36,50 @@ pub struct Evidence {
     pub config: String,
     /// Contents of the log.
     pub inspection: Inspection,
-    /// Reason for which the pipeline lacks an input that it requires.
+    /// Remarks of the reader on what was lost.
+    pub losses: Vec<String>,
+    /// Remarks of the reader on images that make no frame although nothing was lost.
+    pub frameless: Vec<String>,
+    /// Reason why the pipeline lacks an input that it requires.
     pub refusal: Option<LogError>,
     /// Source that the controller lacks.
     pub missing: Option<MissingSource>,
-    /// True if the user names the config: without a name `tagalong run` takes no heed of the controller.
+    /// True if the user named the config: otherwise `tagalong run` ignores the controller.
     pub is_named: bool,
     /// `[input]` of the config.
     pub input: InputSettings,
     /// `[suits]` of the config.
     pub suits: Suits,
-    /// True if the log tells the robot's motion.
+    /// True if the log has the motion of the robot.
     pub has_odometry: bool,
     /// Inputs of the pipeline.
     pub inputs: Inputs,
     /// Measurements in frames.
     pub samples: Samples,
-    /// Judgement of the depth in them; made by the first check that needs it.
+    /// Assessment of their depth; the first check that needs it makes it.
     pub depth: OnceCell<Option<JudgedDepth>>,
-    /// Frames that could be made, and those that could not.
+    /// Numbers of frames that could be made, and of those that could not.
     pub reading: Reading,
-    /// Way of the robot.
+    /// Motion of the robot.
     pub driven: Driven,
     /// Result of the pipeline.
     pub trial: Trial,
-    /// Tracks of the pipeline against things that come and go.
+    /// Tracks of the pipeline compared with shapes that come and go.
     pub coverage: Coverage,
-    /// Causes for which shapes that come and go have no track, with their numbers, most first.
+    /// Reasons why shapes that come and go have no track, with their numbers, most frequent first.
     pub causes: Vec<(Cause, usize)>,
     /// Share of the points in depth that come and go; `None` where none can be compared.
     pub changed: Option<f64>,
-    /// Built-in configs that fit the log, the best first; looked for where they are needed.
+    /// Built-in configs that fit the log, the best first; only searched when they are needed.
     pub fitting: Vec<&'static str>,
-    /// Result of other settings, where they were tried.
+    /// Results of other settings, if any were tried.
     pub alternatives: Vec<Alternative>,
-    /// Preparations of the images of neural networks, where the pipeline has one.
+    /// Preparations of images for neural networks, if the pipeline has one.
     pub preparations: Vec<Preparations>,
 }
 
 impl Evidence {
-    /// Returns true if height and tilt of the camera are a mere assumption.
+    /// Returns true if the height and tilt of the camera are only assumed.
     pub fn is_pose_assumed(&self) -> bool {
         self.inspection.facts.camera_source.starts_with("an assumption")
     }
@@ -91,22 +95,23 @@ impl Evidence {
 /// Result of a preparation.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Prepared {
-    /// Settings that differ from the config, as a line; empty for the config as it is.
+    /// Settings that differ from the config, as a line; empty for the config itself.
     pub change: String,
-    /// Frames in which people are found.
+    /// Number of frames in which people are found.
     pub found: usize,
-    /// Mean over the frames of the probability of the likeliest person; 0 for frames without one.
+    /// Mean over the frames of the probability of the likeliest person, which is 0 in frames
+    /// without people.
     pub score: f64,
 }
 
-/// Preparations of the images of one network.
+/// Preparations of the images for one network.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Preparations {
-    /// Frames that were tried.
+    /// Number of frames that were tried.
     pub frames: usize,
-    /// That of the config.
+    /// Preparation of the config.
     pub now: Prepared,
-    /// The best other one, with as few settings as it takes; none was tried where that of the
+    /// Best other preparation, with as few settings as possible; none is tried if that of the
     /// config finds people in most frames.
     pub best: Option<Prepared>,
 }
@@ -114,24 +119,24 @@ pub struct Preparations {
 /// Numbers of frames of a pass.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Reading {
-    /// Frames that were made.
+    /// Number of frames that were made.
     pub made: u64,
-    /// Images (or scans) until then that should have made a frame.
+    /// Number of images (or scans) until then that should have made a frame.
     pub wanted: u64,
-    /// All images (or scans) of the log.
+    /// Number of all images (or scans) of the log.
     pub in_log: u64,
 }
 
-/// Way of the robot over the examined frames, and of the camera on it.
+/// Motion of the robot, and of the camera on it, over the examined frames.
 #[derive(Clone, Debug, Default)]
 pub struct Driven {
-    /// Length of the way, m.
+    /// Length of the path, m.
     pub metres: f64,
     /// Sum of all turns, rad.
     pub turned_rad: f64,
-    /// Farthest that the camera got from its first place on the robot, m.
+    /// Largest distance of the camera from its first position on the robot, m.
     pub camera_moved_m: f64,
-    /// Largest angle that the camera turned away from its first direction on the robot, rad.
+    /// Largest angle of the camera from its first direction on the robot, rad.
     pub camera_turned_rad: f64,
     first_camera: Option<Arc<Camera>>,
 }
@@ -158,9 +163,9 @@ impl Driven {
 pub struct Scans {
     /// Number of scans.
     pub count: usize,
-    /// Reflections in all of them.
+    /// Number of reflections in all of them.
     pub readings: usize,
-    /// Highest number of a ray, plus one.
+    /// Number of rays: the highest index plus one.
     pub rays: u32,
     /// Angle between two rays, rad.
     pub increment_rad: f64,
@@ -169,15 +174,15 @@ pub struct Scans {
     /// Height of the scanner above the floor, m.
     pub height_m: f64,
     /// Scan of about a second before.
-    earlier: Option<TimedRanges>,
+    pub(super) earlier: Option<TimedRanges>,
     /// Rays with a reflection in two scans a second apart, and those of them that changed.
-    compared: u64,
-    changed: u64,
+    pub(super) compared: u64,
+    pub(super) changed: u64,
 }
 
 /// Ranges of a scan by their rays, m, with its time.
 #[derive(Clone, Debug)]
-struct TimedRanges {
+pub(super) struct TimedRanges {
     stamp: Stamp,
     increment_rad: f64,
     ranges: BTreeMap<u32, f64>,
@@ -241,27 +246,27 @@ impl Scans {
     }
 }
 
-/// Measurements of frames that are spread over the log.
+/// Measurements in frames that are spread over the log.
 pub struct Samples {
     every: u64,
     /// Number of measured frames.
     pub count: usize,
-    /// Camera of the first one.
+    /// Camera of the first measured frame.
     pub camera: Option<Arc<Camera>>,
-    /// Exposure of each.
+    /// Exposure of each measured frame.
     pub exposures: Vec<Exposure>,
     /// Some of the depth images.
     pub depths: Vec<Arc<DepthImage>>,
-    /// Overlap of the edges of depth and colour.
+    /// Overlap of edges in depth with edges in colour.
     pub overlap: EdgeOverlap,
-    /// Floor in each frame where it was found, with the camera of that frame.
+    /// Floor in each frame in which it was found, with the camera of that frame.
     pub floors: Vec<(Ground, Arc<Camera>)>,
-    /// Laser scans.
-    pub scans: Scans,
+    /// Laser scans, those of the first scanner first.
+    pub scans: Vec<Scans>,
 }
 
 impl Samples {
-    /// Returns empty samples for about so many frames.
+    /// Creates empty samples for an expected number of frames.
     pub fn of(frames: u64) -> Self {
         Self {
             every: (frames / SAMPLES).max(1),
@@ -271,15 +276,16 @@ impl Samples {
             depths: Vec::new(),
             overlap: EdgeOverlap::new(OverlapSettings::default()),
             floors: Vec::new(),
-            scans: Scans::default(),
+            scans: Vec::new(),
         }
     }
 
-    /// Measures the frame if it is its turn.
+    /// Measures the frame if it is selected.
     pub fn take(&mut self, number: u64, item: &LogFrame) {
         // Scans are cheap, and the number of rays is that of the longest one.
-        if let Some(scan) = item.frame.laser() {
-            self.scans.take(scan, item.frame.stamp);
+        self.take_scan(0, item.frame.laser(), item.frame.stamp);
+        for (place, scan) in item.frame.further_scans().iter().enumerate() {
+            self.take_scan(place + 1, scan.as_ref(), item.frame.stamp);
         }
         if !number.is_multiple_of(self.every) {
             return;
@@ -302,6 +308,17 @@ impl Samples {
         }
         let floor = ground_of_depth(&depth, &frame.camera, &GroundSettings::default());
         self.floors.extend(floor.map(|floor| (floor, Arc::clone(&frame.camera))));
+    }
+}
+
+impl Samples {
+    /// Measures the scan of a scanner, if it has one.
+    fn take_scan(&mut self, scanner: usize, scan: Option<&LaserScan>, at: Stamp) {
+        let Some(scan) = scan else { return };
+        if self.scans.len() <= scanner {
+            self.scans.resize(scanner + 1, Scans::default());
+        }
+        self.scans[scanner].take(scan, at);
     }
 }
 
@@ -330,6 +347,19 @@ mod tests {
             driven.take(&Frame::new(1, Stamp::default(), camera, motion, Images::default()));
         }
         driven.moves_camera()
+    }
+
+    #[test]
+    fn scans_are_counted_for_each_scanner() {
+        let mut samples = Samples::of(3);
+        let met = LaserScan::of_points(vec![nalgebra::Point3::new(2.0, 0.0, 0.0)]);
+        samples.take_scan(2, Some(&met), Stamp::default());
+        samples.take_scan(0, Some(&met), Stamp::default());
+        samples.take_scan(0, None, Stamp::default());
+        samples.take_scan(0, Some(&LaserScan::of_points(Vec::new())), Stamp::default());
+        let counts: Vec<usize> = samples.scans.iter().map(|scans| scans.count).collect();
+        let readings: Vec<usize> = samples.scans.iter().map(|scans| scans.readings).collect();
+        assert_eq!((counts, readings), (vec![2, 0, 1], vec![1, 0, 1]));
     }
 
     #[test]

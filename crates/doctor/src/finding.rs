@@ -6,18 +6,18 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Severity {
-    /// As it should be.
+    /// No problem.
     Ok,
-    /// Could not be measured on this log.
+    /// It could not be measured on this log.
     Unknown,
-    /// Causes missed people in some frames.
+    /// It causes missed people in some frames.
     Warn,
-    /// Explains missing or false detections.
+    /// It explains missing or false detections.
     Bad,
 }
 
 impl Severity {
-    /// Returns the severity of a deviation, by the two limits.
+    /// Returns the severity of a deviation from its two limits.
     pub fn beyond(deviation: f64, warn: f64, bad: f64) -> Self {
         if deviation >= bad {
             Self::Bad
@@ -48,16 +48,16 @@ pub struct Finding {
     pub severity: Severity,
     /// Measured values, with units.
     pub measured: String,
-    /// The same as numbers; the names end in the unit.
+    /// The same as numbers, with names that end in the unit.
     pub figures: BTreeMap<&'static str, f64>,
-    /// Reason for which it matters.
+    /// Reason why it matters.
     pub why: &'static str,
-    /// Remedy: a line of the config where there is one.
+    /// Remedy: a line of the config if there is one.
     pub remedy: Option<String>,
 }
 
 impl Finding {
-    /// Returns a finding without figures and remedy.
+    /// Creates a finding without figures and remedy.
     pub fn new(id: &'static str, severity: Severity, measured: impl Into<String>) -> Self {
         let measured = measured.into();
         Self { id, severity, measured, figures: BTreeMap::new(), why: "", remedy: None }
@@ -69,12 +69,12 @@ impl Finding {
         self
     }
 
-    /// Adds the reason for which it matters.
+    /// Adds the reason why it matters.
     pub fn why(self, why: &'static str) -> Self {
         Self { why, ..self }
     }
 
-    /// Adds the remedy, if the finding is a problem.
+    /// Adds the remedy if the finding is a problem.
     pub fn remedy(self, remedy: impl Into<String>) -> Self {
         let remedy = (self.severity >= Severity::Warn).then(|| remedy.into());
         Self { remedy, ..self }

@@ -1,4 +1,4 @@
-//! Questions after a visit, where its findings ask for them: other settings and other configs.
+//! Further attempts after a visit, if its findings require them: other settings and other configs.
 
 use tagalong_app::choice::{CHOICES, fitting};
 use tagalong_config::Registry;
@@ -7,7 +7,7 @@ use super::args::Trying;
 use super::visit::{Scope, Visit};
 use super::{alternatives, checks, preparations};
 
-/// Looks for other settings and other configs where the findings ask for them.
+/// Tries other settings and other configs if the findings require it.
 pub fn ask_further(visit: &mut Visit, when: Trying, scope: Scope, registry: &Registry) {
     if visit.evidence.refusal.is_some() {
         let found = fitting(scope.log, registry, scope.input, CHOICES.len()).fitting;

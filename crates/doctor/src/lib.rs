@@ -1,11 +1,11 @@
 //! `tagalong doctor`: explains missing or false detections.
 //!
-//! A `visit` passes a log through a pipeline and measures both; the `checks` turn the
-//! measurements into findings. `scenery` holds things that come and go in depth, whatever a
-//! pipeline makes of them, and `coverage` compares them with its tracks. Where those disagree,
-//! `alternatives` tries other settings on the same frames, and `preparations` other colours, scales
-//! and places of the images of a neural network. Without a config, `comparison`
-//! visits the log with each built-in pipeline that fits it.
+//! A `visit` passes a log through a pipeline and measures both; the `checks` turn the measurements
+//! into findings. `scenery` has the shapes that come and go in depth, independent of any pipeline,
+//! and `coverage` compares them with the tracks. If these disagree, `alternatives` tries other
+//! settings on the same frames, and `preparations` tries other colour orders, scales and placements
+//! of the images for a neural network. Without a config, `comparison` visits the log with each
+//! built-in pipeline that fits it.
 //!
 //! ```
 //! use clap::Parser as _;
@@ -60,11 +60,11 @@ use self::visit::{Scope, Visit};
 /// Runs the checks and a pipeline on a log, and reports the problems.
 ///
 /// # Errors
-/// A config or a log that cannot be read; a folder that cannot be written. A problem with the log
-/// is no error, but exit code 3.
+/// A config or a log that cannot be read, or a folder that cannot be written. A problem with the
+/// log is not an error, but gives exit code 3.
 pub fn doctor(args: &DoctorArgs, registry: &Registry) -> Outcome {
     let config = args.config.as_deref().map(ConfigFile::read).transpose()?;
-    // The mistakes of a config are told before those of the log.
+    // Errors in a config are reported before those of the log.
     if let Some(config) = &config {
         config.pipeline(registry, None)?;
     }

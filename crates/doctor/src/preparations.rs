@@ -1,5 +1,5 @@
-//! Preparations of images for a neural network, tried on frames of the log: a wrong one finds no
-//! people without a word.
+//! Preprocessing of images for a neural network, tried on frames of the log. With a wrong one the
+//! network finds no people, without any error.
 
 use tagalong_config::{Context, Registry};
 use tagalong_core::{Detector, DiffDrive, Frame, Funnel, Query};
@@ -12,16 +12,16 @@ use super::evidence::{Preparations, Prepared};
 use super::trial::Spread;
 use super::visit::{Scope, Visit};
 
-/// Most frames, spread over the log.
+/// Largest number of frames, spread over the log.
 const FRAMES: usize = 8;
-/// More people than this in a frame are noise: values far outside of the usual range saturate
-/// all scores.
+/// Number of people in a frame above which they count as noise, because values far outside of the
+/// usual range saturate all scores.
 const CROWD: usize = 30;
-/// Share of frames with people from which on a preparation is not doubted.
+/// Share of frames with people from which a preparation counts as correct.
 const ENOUGH: f64 = 0.75;
-/// Loss of the score that is no reason for a further setting.
+/// Loss of the score that does not justify a further setting.
 const SAME: f64 = 0.02;
-/// Means and deviations of ImageNet in red, green, blue, 0 to 255, as torchvision states them.
+/// Means and deviations of ImageNet in red, green and blue, 0 to 255, from torchvision.
 const IMAGENET: [[f64; 3]; 2] = [[123.675, 116.28, 103.53], [58.395, 57.12, 57.375]];
 
 /// Settings of the plugin.
@@ -82,7 +82,7 @@ fn sample(visit: &Visit, scope: Scope) -> Vec<Frame> {
 }
 
 impl Bench<'_> {
-    /// Tries the preparation of the config and, if that finds few people or if `always`, all
+    /// Tries the preparation of the config and, if it finds few people or if `always` is set, all
     /// others. `None` if the network cannot be run.
     fn preparations(&self, always: bool) -> Option<Preparations> {
         if self.frames.is_empty() {
@@ -97,7 +97,7 @@ impl Bench<'_> {
             let result = self.run(&settings)?;
             Some((settings, result))
         });
-        // Of equals the first one stays.
+        // Of equal ones the first is kept.
         let best = results.reduce(|best, other| {
             let is_better = other.1.score > best.1.score + SAME;
             if is_better { other } else { best }
@@ -106,7 +106,7 @@ impl Bench<'_> {
         Some(Preparations { frames, now, best })
     }
 
-    /// Leaves out the settings that are not needed for a result.
+    /// Removes settings that a result does not need.
     fn simplified(&self, mut settings: Settings, mut best: Prepared) -> Prepared {
         for keys in
             [&["fit"][..], &["colours", "mean", "deviation"], &["colours"], &["mean", "deviation"]]
@@ -144,7 +144,8 @@ impl Bench<'_> {
     }
 }
 
-/// Returns the probability of the likeliest person in a frame; 0 if there is none, or a crowd.
+/// Returns the probability of the likeliest person in a frame; 0 if there is none, or if there are
+/// too many.
 fn likeliest(detector: &mut dyn Detector, frame: &Frame) -> Option<f64> {
     let everywhere = Query::Discover { occupied: &[] };
     let found = detector.detect(frame, &everywhere, &mut Funnel::default()).ok()?;
@@ -155,7 +156,7 @@ fn likeliest(detector: &mut dyn Detector, frame: &Frame) -> Option<f64> {
     Some(scores.fold(0.0, f64::max))
 }
 
-/// Returns all combinations of colour order, scale and place.
+/// Returns all combinations of colour order, scale and placement.
 fn combinations() -> Vec<Settings> {
     let mut all = Vec::new();
     for fit in ["centre", "top-left", "stretch"] {

@@ -1,16 +1,16 @@
-//! Remedies that would change nothing: settings that a config has already.
+//! Removal of remedies that would change nothing, because the config already has these settings.
 
 use tagalong_app::remedies::number;
 use toml::{Table, Value};
 
-/// Words that lead to a setting, and lead nowhere without one.
+/// Words that introduce a setting, and are removed with it.
 const LEADS: &[&str] = &["; else", "; until then", BY_EVIDENCE, ", or", "; or", "else", "or"];
 
 /// Words before the setting of a track manager.
 pub const BY_EVIDENCE: &str = "; where they are things, believe tracks by evidence:";
 
-/// Removes the lines of a remedy that set what a resolved config has already, or what the plugin of
-/// a section does not know. Returns `None` if nothing is left.
+/// Removes the lines of a remedy whose settings a resolved config already has, or the plugin of a
+/// section does not know. Returns `None` if nothing is left.
 pub fn differing(remedy: &str, resolved: &Table) -> Option<String> {
     let (mut kept, mut section, mut pending): (Vec<&str>, &str, Option<&str>) = (vec![], "", None);
     for line in remedy.lines() {
@@ -38,7 +38,7 @@ pub fn differing(remedy: &str, resolved: &Table) -> Option<String> {
     (!text.is_empty()).then_some(text)
 }
 
-/// Splits `[section] key = value` into the name of its section, if there is one, and the rest.
+/// Splits `[section] key = value` into the name of the section, if there is one, and the rest.
 fn split(line: &str) -> (Option<&str>, &str) {
     let inner = line.strip_prefix('[').filter(|inner| !inner.starts_with('['));
     match inner.and_then(|inner| inner.split_once(']')) {
@@ -47,7 +47,7 @@ fn split(line: &str) -> (Option<&str>, &str) {
     }
 }
 
-/// Returns true if a setting has its value already, or does not exist.
+/// Returns true if a setting already has its value, or does not exist.
 fn is_vain(section: &str, setting: &str, resolved: &Table) -> bool {
     let Some((key, value)) = setting.split_once(" = ").filter(|_| !section.is_empty()) else {
         return false;
@@ -71,7 +71,7 @@ fn digits(literal: &str) -> i32 {
     literal.split_once('.').map_or(0, |(_, digits)| digits.len() as i32)
 }
 
-/// Compares numbers to the printed digits, other values as they are.
+/// Compares numbers to the printed digits, and other values exactly.
 fn is_equal(value: &Value, now: &Value, digits: i32) -> bool {
     match (number(value), number(now)) {
         (Some(a), Some(b)) => (a - b).abs() <= 0.5 * 10f64.powi(-digits) * (1.0 - 1e-6),

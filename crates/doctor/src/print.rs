@@ -7,10 +7,10 @@ use super::coverage::{Alternative, Coverage};
 use super::diagnosis::{Diagnosis, Drop, Row};
 use super::finding::{Finding, Severity};
 
-/// Lines of the funnel that are shown.
+/// Largest number of lines of the funnel that are shown.
 const FUNNEL_LINES: usize = 8;
 
-/// Settings that are shown.
+/// Largest number of settings that are shown.
 const SETTING_LINES: usize = 10;
 
 /// Returns the diagnosis, for a terminal.
@@ -28,10 +28,7 @@ pub fn text(diagnosis: &Diagnosis) -> String {
         out.push('\n');
     }
     diagnosis.findings.iter().for_each(|found| finding(&mut out, found));
-    if let Some(slow) = diagnosis.period_ms.and_then(|ms| too_slow(diagnosis.coverage.frame_ms, ms))
-    {
-        let _ = writeln!(out, "\n{slow}; `tagalong doctor LOG` prints the time of each pipeline");
-    }
+    too_slow_here(&mut out, diagnosis);
     settings(&mut out, diagnosis);
     if let Some(folder) = &diagnosis.pictures {
         let _ = writeln!(out, "\npictures of frames with their tracks: {}", folder.display());
@@ -45,7 +42,7 @@ pub fn text(diagnosis: &Diagnosis) -> String {
     out
 }
 
-/// Writes the table of the pipelines, and names the one that is taken.
+/// Writes the table of the pipelines, and names the selected one.
 fn pipelines(out: &mut String, diagnosis: &Diagnosis) {
     if diagnosis.pipelines.is_empty() {
         return;
@@ -58,10 +55,10 @@ fn pipelines(out: &mut String, diagnosis: &Diagnosis) {
         let failure = failure.iter().map(|why| format!(": failed, {why}")).collect::<String>();
         let _ = writeln!(out, "  {}  {frame_ms:>7.1}  {config}{mark}{failure}", figures(coverage));
     }
-    if let Some(why) = &diagnosis.network {
-        let _ = writeln!(out, "  {:>w$}  {:>7}  network: {why}", "-", "-", w = heading().len());
-    }
     let _ = writeln!(out, "{}", legend(&diagnosis.coverage));
+    if let Some(why) = &diagnosis.network {
+        let _ = writeln!(out, "  no network is among them: {why}");
+    }
     slow(out, diagnosis);
     if let Some(taken) = diagnosis.pipelines.iter().find(|row| row.taken) {
         let contents = &diagnosis.contents;
@@ -77,7 +74,20 @@ fn pipelines(out: &mut String, diagnosis: &Diagnosis) {
     }
 }
 
-/// Writes which pipelines take longer for a frame than the log has for it.
+/// Writes that the pipeline takes longer per frame than the interval between frames of the log.
+fn too_slow_here(out: &mut String, diagnosis: &Diagnosis) {
+    let Some(period_ms) = diagnosis.period_ms else { return };
+    let Some(slow) = too_slow(diagnosis.coverage.frame_ms, period_ms) else { return };
+    // Without a config, the times of all pipelines are printed above.
+    let others = if diagnosis.pipelines.is_empty() {
+        "; `tagalong doctor LOG` prints the time of each pipeline"
+    } else {
+        ""
+    };
+    let _ = writeln!(out, "\n{slow}{others}");
+}
+
+/// Writes which pipelines take longer per frame than the interval between frames of the log.
 fn slow(out: &mut String, diagnosis: &Diagnosis) {
     let Some(period_ms) = diagnosis.period_ms else { return };
     let slow = diagnosis.pipelines.iter().filter(|row| row.frame_ms > period_ms);
@@ -92,11 +102,12 @@ fn slow(out: &mut String, diagnosis: &Diagnosis) {
     }
 }
 
-/// Gain of a pipeline over the one that is taken, below which it is not told.
+/// Gain of a pipeline over the selected one below which it is not mentioned.
 const MIN_GAIN: f64 = 0.03;
 
-/// Writes which pipeline misses fewer person-sized shapes on this log than the one that is taken. More
-/// is not measured: without truth, one that finds them under changing IDs looks as good.
+/// Writes which pipeline misses fewer person-sized shapes on this log than the selected one.
+/// Nothing else is measured: without truth, a pipeline that finds people under changing IDs looks
+/// equally good.
 fn better(out: &mut String, taken: &Row, rows: &[Row]) {
     let tracking = rows.iter().filter(|row| row.coverage.moving > 0);
     let best = tracking.max_by(|a, b| a.coverage.worth().total_cmp(&b.coverage.worth()));
@@ -116,7 +127,7 @@ fn better(out: &mut String, taken: &Row, rows: &[Row]) {
     }
 }
 
-/// Writes the settings that were tried.
+/// Writes the results of the settings that were tried.
 fn settings(out: &mut String, diagnosis: &Diagnosis) {
     if diagnosis.alternatives.is_empty() {
         return;
@@ -156,7 +167,7 @@ fn percent(part: f64) -> String {
     format!("{:.0} %", 100.0 * part)
 }
 
-/// Returns the meaning of the columns, by what the log has.
+/// Returns the meaning of the columns, depending on the data of the log.
 fn legend(coverage: &Coverage) -> &'static str {
     if coverage.has_depth {
         "  moving, still: tracks that moved, and that never did; boxes: per frame; idle: boxes where\n  \
@@ -201,7 +212,8 @@ fn summary(out: &mut String, findings: &[Finding]) {
 mod tests {
     use super::*;
 
-    /// Returns the row of a pipeline with so many moving tracks and so many of 100 shapes missed.
+    /// Returns the row of a pipeline with a number of moving tracks, and a number of missed shapes
+    /// of 100.
     fn row(config: &str, moving: usize, unexplained: usize) -> Row {
         let coverage = Coverage { moving, blobs: 100, unexplained, ..Coverage::default() };
         let config = config.to_owned();
@@ -224,6 +236,26 @@ mod tests {
         out.clear();
         summary(&mut out, &[well, Finding::new("odometry", Severity::Unknown, "")]);
         assert_eq!(out, "\nno problem found; 1 not known\n");
+    }
+
+    #[test]
+    fn a_report_with_the_times_of_all_pipelines_does_not_advise_itself() {
+        let mut diagnosis = Diagnosis { period_ms: Some(40.0), ..Diagnosis::default() };
+        diagnosis.coverage.frame_ms = 80.0;
+        let mut out = String::new();
+        too_slow_here(&mut out, &diagnosis);
+        assert!(
+            out.contains("live, the others are skipped; `tagalong doctor LOG` prints"),
+            "{out}"
+        );
+        diagnosis.pipelines = vec![row("late", 1, 0)];
+        diagnosis.network = Some("install one".to_owned());
+        out.clear();
+        too_slow_here(&mut out, &diagnosis);
+        assert!(out.ends_with("live, the others are skipped\n"), "{out}");
+        // What does not fit is no row of the table of those that do.
+        let printed = text(&diagnosis);
+        assert!(printed.contains("\n  no network is among them: install one\n"), "{printed}");
     }
 
     #[test]

@@ -9,7 +9,7 @@ use tagalong_render::write_png;
 
 use super::trial::{Example, Trial};
 
-/// Pictures beside each other.
+/// Number of pictures in a row.
 const COLUMNS: usize = 4;
 
 /// Gap between pictures, pixels.
@@ -34,7 +34,7 @@ pub fn write(trial: &Trial, folder: &Path) -> Result<BTreeMap<&'static str, Path
     Ok(written)
 }
 
-/// Returns the test's name with only letters, digits and dashes.
+/// Returns the name of the test with only letters, digits and dashes.
 fn file_name(test: &str) -> String {
     let words = test.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
     words.collect::<Vec<_>>().join("-")
@@ -74,7 +74,7 @@ mod tests {
         let sheet = sheet("a test", &examples).into_image();
         assert_eq!((sheet.width(), sheet.height()), (4 * 64 + 4, 2 * 64 + 22 + 4));
         let red = sheet.pixels().iter().filter(|pixel| **pixel == [200, 0, 0]).count();
-        // The number of the frame covers a strip of each.
+        // The number of the frame covers a strip of each picture.
         assert!(red > 5 * 2400, "{red}");
     }
 

@@ -1,4 +1,4 @@
-//! Pictures of some frames with their tracks.
+//! Pictures of selected frames with their tracks.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -11,13 +11,14 @@ use tagalong_render::{Overlay, OverlayData, OverlayStyle};
 
 use super::visit::{Scope, Visit};
 
-/// Frames spread over the log.
+/// Number of frames that are spread over the log.
 const SPREAD: usize = 6;
 
-/// Frames with the most shapes that have no track.
+/// Number of frames with the most shapes without a track.
 const WORST: usize = 6;
 
-/// Writes pictures of some frames, worst and others, as `000015.png` by the frame's index.
+/// Writes pictures of selected frames, the worst and others, named by the index of the frame, as
+/// `000015.png`.
 ///
 /// # Errors
 /// A folder or a picture that cannot be written.
@@ -49,7 +50,7 @@ pub fn write(visit: &Visit, scope: Scope, folder: &Path) -> Result<(), Failure> 
     Ok(())
 }
 
-/// Returns the indices of the frames to be shown.
+/// Returns the indices of the selected frames.
 fn wanted(visit: &Visit) -> BTreeSet<u64> {
     let reports = &visit.evidence.trial.reports;
     let every = (reports.len() / SPREAD).max(1);

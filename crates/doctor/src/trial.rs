@@ -1,4 +1,5 @@
-//! Short run of the pipeline: people that it finds, and candidates that each test drops.
+//! Run of the pipeline for a visit: the people that it finds, and the candidates that each test
+//! drops.
 
 use std::collections::BTreeMap;
 
@@ -11,23 +12,23 @@ use tagalong_render::background;
 
 use super::coverage::Course;
 
-/// Most pictures of one test.
+/// Largest number of pictures of one test.
 const EXAMPLES: usize = 16;
 
 /// Picture of a dropped candidate.
 pub struct Example {
     /// Index of the frame.
     pub frame: u64,
-    /// Region that was dropped, with its surroundings.
+    /// Dropped region with its surroundings.
     pub picture: RgbImage,
 }
 
 /// Result of the pipeline on the frames.
 #[derive(Default)]
 pub struct Trial {
-    /// Number of frames that it was given.
+    /// Number of frames that it processed.
     pub frames: u64,
-    /// Places of its tracks.
+    /// Positions of its tracks.
     pub course: Course,
     /// Number of drops per test.
     pub funnel: Funnel,
@@ -35,14 +36,14 @@ pub struct Trial {
     pub witness: Witness,
     /// Example pictures, by test.
     pub examples: BTreeMap<&'static str, Spread<Example>>,
-    /// Reports of all frames, where pictures of them may be wanted.
+    /// Reports of all frames, if pictures of them may be needed.
     pub reports: Vec<FrameReport>,
-    /// Error of the plugin that ended it.
+    /// Error of the plugin that ended the run.
     pub failure: Option<String>,
 }
 
 impl Trial {
-    /// Passes a frame to the pipeline; does nothing after the error of a plugin.
+    /// Passes a frame to the pipeline; does nothing after an error of a plugin.
     pub fn step(&mut self, pipeline: &mut Pipeline, item: &LogFrame, with_pictures: bool) {
         if self.failure.is_some() {
             return;
@@ -89,11 +90,11 @@ fn dropped(report: &FrameReport) -> BTreeMap<&'static str, Rect> {
     examples.chain(candidates).filter(|(_, place)| place.area() > 0.0).collect()
 }
 
-/// Side of a picture, pixels, and the part of it that the region takes.
+/// Side of a picture, pixels, and the fraction of it that the region fills.
 const SIDE_PX: usize = 144;
 const PART: f64 = 0.6;
 
-/// Returns the region of the image, enlarged or reduced to one size.
+/// Returns the region of the image, scaled to a fixed size.
 fn picture(frame: &Frame, place: &Rect) -> Option<RgbImage> {
     let image = background(&frame.images())?;
     let scale = place.width.max(place.height) / (PART * SIDE_PX as f64);
@@ -126,15 +127,15 @@ impl<T> Default for Spread<T> {
 }
 
 impl<T> Spread<T> {
-    /// Takes an item if it is its turn.
+    /// Adds an item if it is selected.
     pub fn offer(&mut self, make: impl FnOnce() -> Option<T>) {
         let is_due = self.offered.is_multiple_of(self.every);
         self.offered += 1;
         if !is_due {
             return;
         }
-        // When it is full, every other item goes and the stride doubles, so that the rest stays
-        // even.
+        // When it is full, every other item is dropped and the stride doubles, so that the
+        // remaining items stay evenly spaced.
         if self.kept.len() == EXAMPLES {
             let mut number = 0;
             self.kept.retain(|_| {

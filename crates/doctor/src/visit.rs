@@ -26,30 +26,30 @@ pub struct Visit {
     pub config: ConfigFile,
     /// The pipeline.
     pub pipeline: Pipeline,
-    /// Tables of the config that are not the pipeline's.
+    /// Tables of the config that the pipeline does not parse.
     pub outer: OuterSettings,
     /// Settings that the config offers for tuning.
     pub tunables: Vec<Tunable>,
     /// Everything that was measured.
     pub evidence: Evidence,
-    /// Things that come and go.
+    /// Shapes that come and go.
     pub scenery: Scenery,
 }
 
-/// Log to look at, and the extent of the look.
+/// Log of a visit, and the extent of the visit.
 #[derive(Clone, Copy)]
 pub struct Scope<'a> {
     /// The log.
     pub log: &'a Path,
-    /// Way in which it is read.
+    /// Options for reading it.
     pub input: &'a InputArgs,
     /// Number of frames.
     pub frames: u64,
-    /// True if pictures are wanted.
+    /// True if pictures are requested.
     pub with_pictures: bool,
-    /// True if the user names the config.
+    /// True if the user named the config.
     pub is_named: bool,
-    /// True if light, depth, floor and scans are measured, as the checks need them.
+    /// True if exposure, depth, floor and scans are measured for the checks.
     pub with_samples: bool,
 }
 
@@ -62,11 +62,11 @@ impl Visit {
         let (mut pipeline, settings) = config.pipeline(registry, None)?;
         let outer = scope.input.applied(config.outer_for(&pipeline)?);
         let inputs = pipeline.inputs();
-        // Light and coverage are judged, and pictures are rendered, also where the pipeline does
+        // Exposure and coverage are judged, and pictures are rendered, even if the pipeline does
         // not use colour or depth.
         let read = inputs.accept(Input::Colour).accept(Input::Depth);
         let mut found = examine(scope.log, &outer.input, &outer.limits, read)?;
-        // A topic of a wrong kind is a mistake of the config, and shown as such.
+        // A topic of a wrong kind is an error in the config, and is reported as such.
         let is_mistake = matches!(
             found.refusal,
             Some(LogError::WrongTopic { .. } | LogError::UnknownTopic { .. })
@@ -79,6 +79,8 @@ impl Visit {
             config: config.stem(),
             samples: Samples::of(expected),
             depth: OnceCell::new(),
+            losses: found.inspection.notes.clone(),
+            frameless: Vec::new(),
             inspection: found.inspection,
             refusal: found.refusal,
             missing: None,
@@ -113,7 +115,7 @@ impl Visit {
     }
 }
 
-/// Returns the causes for which shapes that come and go have no track, most frequent first.
+/// Returns the reasons why shapes that come and go have no track, most frequent first.
 fn causes(trial: &Trial, scenery: &Scenery, rules: Rules<'_>) -> Vec<(Cause, usize)> {
     let mut counts: BTreeMap<String, (Cause, usize)> = BTreeMap::new();
     for moment in &trial.course.moments {
@@ -148,7 +150,7 @@ fn look(
     views: &mut Views,
     progress: &Progress,
 ) {
-    // Cut short by the user, the images behind the last frame are no loss.
+    // If the user limits the frames, images after the last frame are not lost.
     out.reading.wanted = expected_frames(&out.inspection);
     out.reading.in_log = out.reading.wanted;
     for number in 0..scope.frames {
@@ -171,4 +173,6 @@ fn look(
     out.inspection.counters = frames.counters().clone();
     out.inspection.notes = frames.notes().to_vec();
     out.inspection.data_lost = frames.data_lost();
+    out.losses = frames.losses().to_vec();
+    out.frameless = frames.frameless().to_vec();
 }

@@ -22,6 +22,8 @@ pub enum Cause {
         name: String,
         /// True if the stop lasts until a person has checked the robot and resets it.
         needs_reset: bool,
+        /// True if the images show an earlier time: so do boxes and places of people.
+        shows_past: bool,
     },
     /// The fault that was latched first, which holds until the robot is armed again.
     Fault(&'static str),
@@ -60,7 +62,7 @@ impl Cause {
         }
         if reason == Reason::Frozen {
             let (name, needs_reset) = monitor.frozen_sensor()?;
-            return Some(Self::Sensor { name, needs_reset });
+            return Some(Self::Sensor { name, needs_reset, shows_past: monitor.shows_past() });
         }
         let is_person = match reason {
             Reason::Near | Reason::TooClose => true,
@@ -117,10 +119,10 @@ impl fmt::Display for Cause {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Place(place) => place.fmt(f),
-            Self::Sensor { name, needs_reset: true } => {
+            Self::Sensor { name, needs_reset: true, .. } => {
                 write!(f, "{name}; the robot stands until a reset: check the sensor first")
             }
-            Self::Sensor { name, needs_reset: false } => {
+            Self::Sensor { name, needs_reset: false, .. } => {
                 write!(f, "{name}; the robot stands until it delivers new readings")
             }
             Self::Fault(why) => f.write_str(why),
@@ -178,7 +180,8 @@ mod tests {
             (true, "the robot stands until a reset: check the sensor first"),
             (false, "the robot stands until it delivers new readings"),
         ] {
-            let cause = Cause::Sensor { name: "the depth image".into(), needs_reset };
+            let name = "the depth image".to_owned();
+            let cause = Cause::Sensor { name, needs_reset, shows_past: true };
             assert_eq!(cause.to_string(), format!("the depth image; {words}"));
         }
     }

@@ -117,6 +117,12 @@ impl Steering {
         self.lock.restart(settings, why);
     }
 
+    /// Stops the robot at a frame that leads to no command, until the next one that does.
+    pub fn pass_over(&mut self, frame: &Frame) {
+        self.limiter.withdraw(frame.stamp);
+        self.status.command = Reason::Expired.name();
+    }
+
     /// Limits the speed to this, m/s, beside all other limits, until the next call; infinite for no
     /// limit.
     pub fn allow_speed(&mut self, most_mps: f64) {
@@ -149,7 +155,8 @@ impl Steering {
     }
 
     /// Tells whether the base executes the commands from now on. Only then can they be compared with
-    /// the odometry: a base that does something else, or responds too late, is a fault.
+    /// the odometry: a base that does something else, or responds too late, is a fault. A base that begins
+    /// to execute them starts from rest.
     pub fn set_driving(&mut self, is_driving: bool) {
         self.limiter.set_driving(is_driving);
     }

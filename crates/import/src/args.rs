@@ -15,12 +15,12 @@ pub enum Kind {
     Mot,
     /// A folder of JPEG or PNG images, in the order of their names.
     Images,
-    /// The XML file of annotations made with CVAT (for video 1.1 or for images 1.1): truth for a log
-    /// instead of a log.
+    /// The XML file of annotations made with CVAT (for video 1.1 or for images 1.1): writes truth
+    /// for a log instead of a log.
     Cvat,
-    /// An annotated bag of leg_tracker_benchmarks: truth for the bag instead of a log.
+    /// An annotated bag of leg_tracker_benchmarks: writes truth for the bag instead of a log.
     LegTracker,
-    /// A YAML file of the benchmark Follow-Bench: a scene to simulate instead of a log.
+    /// A YAML file of the benchmark Follow-Bench: writes a scene to simulate instead of a log.
     FollowBench,
 }
 
@@ -32,9 +32,8 @@ pub struct ImportArgs {
     pub kind: Kind,
     /// File or folder to import.
     pub path: PathBuf,
-    /// The log to write [default: runs/NAME.mcap]; of cvat and leg-tracker the truth
-    /// [default: NAME.people.csv, NAME.people-floor.csv]; of follow-bench the scene
-    /// [default: NAME.toml].
+    /// The log to write [default: runs/NAME.mcap]; for cvat and leg-tracker the truth [default:
+    /// NAME.people.csv, NAME.people-floor.csv]; for follow-bench the scene [default: NAME.toml].
     #[arg(short, long, value_name = "LOG")]
     pub output: Option<PathBuf>,
     /// Replace the log if it exists.
@@ -46,7 +45,7 @@ pub struct ImportArgs {
     /// images: images per second.
     #[arg(long, value_name = "HZ", default_value_t = 10.0, value_parser = rate)]
     pub fps: f64,
-    /// Focal length, pixels; positions in metres need it, or --view.
+    /// Focal length, pixels; positions in metres need this or --view.
     #[arg(long, value_name = "PX", value_parser = focal_length)]
     pub focal: Option<f64>,
     /// Horizontal field of view, degrees; an alternative to --focal.
@@ -70,12 +69,13 @@ pub struct ImportArgs {
     /// images: metres per unit of depth.
     #[arg(long, value_name = "M", default_value_t = 0.001, requires = "depth", value_parser = positive)]
     pub depth_unit: f64,
-    /// images: boxes of whole people in them, as COCO JSON (image_id, bbox, track_id) or as CSV with a
-    /// header (image, x, y, w, h or image, xmin, ymin, xmax, ymax, and track_id): writes
+    /// images: boxes of whole people in the images, as COCO JSON (image_id, bbox, track_id) or as
+    /// CSV with a header (image, x, y, w, h or image, xmin, ymin, xmax, ymax, and track_id): writes
     /// NAME.boxes.csv beside the log.
     #[arg(long, value_name = "FILE")]
     pub boxes: Option<PathBuf>,
-    /// cvat: the boxes are of whole bodies, whose upper bodies are compared: writes NAME.boxes.csv.
+    /// cvat: the boxes are those of whole bodies, and upper bodies are derived from them for the
+    /// comparison: writes NAME.boxes.csv.
     #[arg(long)]
     pub whole_bodies: bool,
     /// leg-tracker: topic of the annotated scans, if the bag has several.
@@ -91,10 +91,10 @@ fn positive(text: &str) -> Result<f64, String> {
     if value > 0.0 && value.is_finite() { Ok(value) } else { Err("must be positive".into()) }
 }
 
-/// Highest rate of images, Hz.
+/// Largest rate of images, Hz.
 pub(crate) const MAX_HZ: f64 = 1e4;
 
-/// Parses a number up to a largest one that still makes sense.
+/// Parses a number up to a plausible maximum.
 fn up_to(text: &str, most: f64) -> Result<f64, String> {
     positive(text).and_then(|v| if v <= most { Ok(v) } else { Err(format!("at most {most}")) })
 }

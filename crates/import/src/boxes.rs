@@ -14,12 +14,12 @@ use super::truth::WholeBody;
 
 /// Names of classes that are people.
 const PEOPLE: [&str; 6] = ["person", "people", "pedestrian", "human", "man", "woman"];
-/// Names of the columns with the image, and with the ID of a person.
+/// Names of the columns for the image and for the ID of a person.
 const IMAGES: [&str; 8] =
     ["image", "image_id", "image_name", "filename", "file_name", "file", "path", "frame"];
 const IDS: [&str; 5] = ["track_id", "track", "person_id", "object_id", "trackid"];
 const CLASSES: [&str; 5] = ["class", "label", "category", "class_name", "labelname"];
-/// Names of the four columns of a box: two corners, or a corner and the size.
+/// Names of the four columns of a box: two corners, or one corner and the size.
 const CORNERS: [[&str; 4]; 3] =
     [["xmin", "ymin", "xmax", "ymax"], ["x1", "y1", "x2", "y2"], ["xtl", "ytl", "xbr", "ybr"]];
 const SIZES: [[&str; 4]; 4] = [
@@ -38,7 +38,7 @@ pub struct PersonBox {
     pub id: Option<String>,
     /// Left, top, width and height, pixels.
     pub sides: [f64; 4],
-    /// False: neither a miss nor a false alarm.
+    /// False for a person that counts neither as a miss nor as a false positive.
     pub counts: bool,
 }
 
@@ -74,11 +74,11 @@ struct CocoCategory {
     name: String,
 }
 
-/// Returns the whole bodies in these images, whose order is that of the frames, and notes on boxes that
-/// were left out.
+/// Returns the whole bodies in these images, which are in the order of the frames, and notes on
+/// boxes that were left out.
 ///
 /// # Errors
-/// A file that cannot be read, holds something else, or names none of the images.
+/// A file that cannot be read, has another format, or names none of the images.
 pub fn read(file: &Path, images: &[PathBuf]) -> Result<(Vec<WholeBody>, Vec<String>), Failure> {
     read_boxes(file)
         .and_then(|boxes| placed(boxes, images))
@@ -93,7 +93,7 @@ fn read_boxes(file: &Path) -> Result<Vec<PersonBox>, String> {
 /// Parses the people of an annotation file: COCO if it is JSON, otherwise a CSV with a header.
 ///
 /// # Errors
-/// A sentence with what is read, and with the line of a CSV.
+/// A sentence with the supported formats, and with the line of a CSV.
 pub fn person_boxes(text: &str) -> Result<Vec<PersonBox>, String> {
     if text.trim_start().starts_with(['{', '[']) { coco(text) } else { csv(text) }
 }
@@ -131,7 +131,7 @@ fn coco(text: &str) -> Result<Vec<PersonBox>, String> {
     Ok(boxes)
 }
 
-/// Returns the classes of people in lower case, or the only class.
+/// Returns the lower-case names of the classes of people, or the only class.
 fn people_of<'a>(classes: impl Iterator<Item = &'a str>) -> Result<BTreeSet<String>, String> {
     let all: BTreeSet<String> = classes.map(str::to_lowercase).collect();
     let people: BTreeSet<String> =
@@ -143,7 +143,7 @@ fn people_of<'a>(classes: impl Iterator<Item = &'a str>) -> Result<BTreeSet<Stri
     Ok(if people.is_empty() { all } else { people })
 }
 
-/// Places of the columns of a CSV.
+/// Indices of the columns of a CSV.
 struct Columns {
     image: usize,
     sides: Vec<usize>,
@@ -180,17 +180,17 @@ impl Columns {
     }
 }
 
-/// Returns the places of all columns of these names; `None` if one of them is not there.
+/// Returns the indices of all columns with these names; `None` if one of them is missing.
 fn places(header: &[String], names: &[&str]) -> Option<Vec<usize>> {
     names.iter().map(|name| first_of(header, &[*name])).collect()
 }
 
-/// Returns the place of the first column that has one of these names.
+/// Returns the index of the first column that has one of these names.
 fn first_of(header: &[String], names: &[&str]) -> Option<usize> {
     names.iter().find_map(|name| header.iter().position(|it| it.eq_ignore_ascii_case(name)))
 }
 
-/// Returns a cell that is there and not empty.
+/// Returns a cell if it exists and is not empty.
 fn cell(cells: &[String], at: usize) -> Option<String> {
     cells.get(at).filter(|cell| !cell.is_empty()).cloned()
 }
@@ -222,7 +222,7 @@ fn csv(text: &str) -> Result<Vec<PersonBox>, String> {
     Ok(rows.into_iter().map(|(_, person)| person).collect())
 }
 
-/// Returns the cells of a line, in which quotes keep a separator.
+/// Returns the cells of a line; a separator in quotes does not split.
 fn cells(line: &str, separator: char) -> Vec<String> {
     let mut cells = vec![String::new()];
     for (part, text) in line.split('"').enumerate() {
@@ -238,7 +238,7 @@ fn cells(line: &str, separator: char) -> Vec<String> {
     cells.iter().map(|cell| cell.trim().to_owned()).collect()
 }
 
-/// Gives each box the frame of its image and a number.
+/// Assigns to each box the frame of its image and an ID.
 fn placed(
     boxes: Vec<PersonBox>,
     images: &[PathBuf],
@@ -259,7 +259,7 @@ fn placed(
             elsewhere += 1;
             continue;
         };
-        // Fractions of the sides of an image are smaller than a pixel, too.
+        // Boxes in fractions of the image size are also smaller than a pixel.
         if ![x, y].iter().all(|v| v.is_finite()) || !(1.0..1e6).contains(&width.min(height)) {
             empty += 1;
             continue;

@@ -14,16 +14,16 @@ use tagalong_eval::formats::{MOST_FRAMES, MOST_ID};
 use super::args::ImportArgs;
 use super::truth::{WholeBody, boxes_csv, people_csv};
 
-/// Longest file that is read, bytes.
+/// Largest file that is read, bytes.
 const MOST_BYTES: u64 = 256 << 20;
 
-/// Visible part of a person whose box is marked as occluded: CVAT says no more.
+/// Assumed visible fraction of a person whose box is marked as occluded; CVAT has no fraction.
 const OCCLUDED: f64 = 0.5;
 
 /// Writes the boxes of an XML file as truth for a log.
 ///
 /// # Errors
-/// A file that cannot be read or holds something else: exit code 1; an output that exists: 2.
+/// Exit code 1 for a file that cannot be read or has another format; 2 for an output that exists.
 pub fn import(args: &ImportArgs) -> Outcome {
     let ending = if args.whole_bodies { "boxes.csv" } else { "people.csv" };
     let output = args.output.clone().unwrap_or_else(|| default_output(&args.path, ending));
@@ -49,7 +49,7 @@ fn default_output(path: &Path, ending: &str) -> PathBuf {
     path.with_extension(ending)
 }
 
-/// Reads the people of an XML file, by frame and number.
+/// Reads the people of an XML file, ordered by frame and ID.
 ///
 /// # Errors
 /// A sentence with the line.
@@ -57,14 +57,14 @@ pub fn people_of_cvat(text: &str) -> Result<Vec<Row>, String> {
     parse(text).map(|read| read.rows)
 }
 
-/// Boxes of a file, and a note on shapes that are none.
+/// Boxes of a file, and a note on shapes that are not boxes.
 #[derive(Debug)]
 struct Read {
     rows: Vec<Row>,
     note: Option<String>,
 }
 
-/// Reads the boxes, by frame and number.
+/// Reads the boxes, ordered by frame and ID.
 fn read(path: &Path) -> Result<Read, Failure> {
     let name = path.display().to_string();
     let text = read_text(path, FileLimit::Bytes(MOST_BYTES)).map_err(|error| {
@@ -109,11 +109,11 @@ fn parse(text: &str) -> Result<Read, String> {
     }
 }
 
-/// Kinds of shapes besides rectangles.
+/// Kinds of shapes other than rectangles.
 const OTHER_SHAPES: [&str; 7] =
     ["polygon", "polyline", "points", "mask", "cuboid", "ellipse", "skeleton"];
 
-/// Returns a note on the shapes that are no rectangles; none without any.
+/// Returns a note on the shapes that are not rectangles, if there are any.
 fn other_shapes(root: &Node<'_, '_>) -> Option<String> {
     let counted = OTHER_SHAPES
         .map(|kind| (root.descendants().filter(|node| node.has_tag_name(kind)).count(), kind));
@@ -134,9 +134,9 @@ fn boxes<'a, 'b>(node: &Node<'a, 'b>) -> impl Iterator<Item = Node<'a, 'b>> {
     node.children().filter(|child| child.has_tag_name("box"))
 }
 
-/// Adds the boxes of a person in a video. CVAT exports those between key frames, too.
+/// Adds the boxes of a person in a video. CVAT also exports the boxes between key frames.
 fn track(node: &Node<'_, '_>, rows: &mut Vec<Row>) -> Result<(), String> {
-    // CVAT counts tracks from 0, and 0 is no number of a person.
+    // CVAT counts tracks from 0, which is not a valid ID of a person.
     let id = whole_number(node, "id", MOST_ID - 1)? + 1;
     for shape in boxes(node).filter(|shape| !is_set(shape, "outside")) {
         let key = shape.attribute("keyframe") != Some("0");
@@ -147,7 +147,7 @@ fn track(node: &Node<'_, '_>, rows: &mut Vec<Row>) -> Result<(), String> {
     Ok(())
 }
 
-/// Adds the boxes of an image, which need numbers of their own.
+/// Adds the boxes of an image, which get new IDs.
 fn image(node: &Node<'_, '_>, rows: &mut Vec<Row>) -> Result<(), String> {
     let frame = frame_of(node, "id")?;
     for shape in boxes(node) {
@@ -160,7 +160,7 @@ fn image(node: &Node<'_, '_>, rows: &mut Vec<Row>) -> Result<(), String> {
     Ok(())
 }
 
-/// Returns the number that the annotator gave: the attribute `id`, or the group.
+/// Returns the ID that the annotator assigned: the attribute `id`, or the group.
 fn id_of(shape: &Node<'_, '_>) -> Result<Option<i64>, String> {
     let own = attribute(shape, "id").or_else(|| attribute(shape, "track_id"));
     let group = shape.attribute("group_id").filter(|group| *group != "0");
@@ -174,7 +174,7 @@ fn id_of(shape: &Node<'_, '_>) -> Result<Option<i64>, String> {
     })
 }
 
-/// Returns an attribute that the annotator gave a box.
+/// Returns an attribute that the annotator assigned to a box.
 fn attribute<'a>(shape: &Node<'a, '_>, name: &str) -> Option<&'a str> {
     let mut all = shape.children().filter(|child| child.has_tag_name("attribute"));
     all.find(|child| child.attribute("name") == Some(name))?.text()
@@ -221,11 +221,11 @@ fn number(node: &Node<'_, '_>, name: &str) -> Result<f64, String> {
 
 /// Returns an attribute that is a whole number from 0 to `most`.
 fn whole_number(node: &Node<'_, '_>, name: &str, most: i64) -> Result<i64, String> {
-    let value = number(node, name)?;
-    if value.fract() == 0.0 && (0.0..=most as f64).contains(&value) {
-        return Ok(value as i64);
-    }
-    Err(at(node, &format!("`{name}` is `{value}`, expected a whole number from 0 to {most}")))
+    let text = node.attribute(name).unwrap_or_default();
+    let value = text.parse::<i64>().ok().filter(|value| (0..=most).contains(value));
+    value.ok_or_else(|| {
+        at(node, &format!("`{name}` is `{text}`, expected a whole number from 0 to {most}"))
+    })
 }
 
 /// Returns the number of a frame, from 1. CVAT counts from 0.
@@ -239,7 +239,7 @@ fn at(node: &Node<'_, '_>, why: &str) -> String {
     format!(", line {row}: {why}")
 }
 
-/// Returns MOTChallenge text of whole bodies, of which `eval` compares the upper bodies.
+/// Returns MOTChallenge text of whole bodies, from which `eval` derives the upper bodies.
 fn mot(rows: &[Row]) -> String {
     let mut bodies = Vec::new();
     for row in rows {
@@ -319,7 +319,10 @@ mod tests {
             (&VIDEO.replace("xbr=\"62.5\"", "xbr=\"2\""), ", line 5: a box without an area"),
             (&VIDEO.replace("frame=\"1\" keyframe=\"0\"", "frame=\"-1\""), "`frame` is `-1`"),
             (&VIDEO.replace("frame=\"0\"", "frame=\"1700000000\""), "line 4: `frame` is `17"),
-            (&VIDEO.replace("id=\"4\"", "id=\"9223372036854775807\""), ", line 8: `id` is `92"),
+            (
+                &VIDEO.replace("id=\"4\"", "id=\"9223372036854775807\""),
+                "`id` is `9223372036854775807`,",
+            ),
             (&VIDEO.replace("id=\"4\"", "id=\"1e400\""), ", line 8: `id` is `1e400`"),
             (&VIDEO.replace("id=\"4\"", "id=\"0.5\""), ", line 8: `id` is `0.5`"),
             (

@@ -12,10 +12,10 @@ use super::recorded;
 use super::sequence::{Eye, Sequence, pictures, size, steady, text};
 use super::truth::boxes_csv;
 
-/// Reads a folder of images, with one of depth if the options say so.
+/// Reads a folder of images, with a folder of depth images if the options name one.
 ///
 /// # Errors
-/// Folders that cannot be read, or do not hold the same number of images.
+/// Folders that cannot be read, or have different numbers of images.
 pub fn images(args: &ImportArgs) -> Result<Sequence, Failure> {
     let files = pictures(&args.path)?;
     let annotated = args.boxes.as_ref().map(|boxes| boxes::read(boxes, &files)).transpose()?;
@@ -43,7 +43,7 @@ pub fn images(args: &ImportArgs) -> Result<Sequence, Failure> {
     Ok(sequence)
 }
 
-/// Reads a sequence of the MOTChallenge: its images, and its truth where it is there.
+/// Reads a sequence of the MOTChallenge: its images, and its truth if there is one.
 ///
 /// # Errors
 /// Files that are missing or wrong.
@@ -62,7 +62,7 @@ pub fn mot(args: &ImportArgs) -> Result<Sequence, Failure> {
     if !folder.exists() {
         return Err(Failure::failed(format!(
             "{}: no such folder, so there are no images; `tagalong boxes FOLDER_OF_SEQUENCES` tracks \
-             the boxes of det/det.txt without them",
+             the boxes of det/det.txt without them; --boxes DIR names the folder of the boxes",
             folder.display()
         )));
     }
@@ -77,13 +77,13 @@ pub fn mot(args: &ImportArgs) -> Result<Sequence, Failure> {
     Ok(sequence)
 }
 
-/// The value of a key in a `seqinfo.ini`.
+/// Returns the value of a key in a `seqinfo.ini`.
 fn ini_value<'t>(text: &'t str, key: &str) -> Option<&'t str> {
     let mut pairs = text.lines().filter_map(|line| line.split_once('='));
     pairs.find(|(name, _)| name.trim() == key).map(|(_, value)| value.trim())
 }
 
-/// Reads images at a steady rate, with the camera of the options.
+/// Reads images with times at a constant rate, and with the camera of the options.
 fn of_files(args: &ImportArgs, files: Vec<PathBuf>, fps: f64) -> Result<Sequence, Failure> {
     let columns = match files.first() {
         Some(first) => size(first)?.0,
@@ -102,7 +102,8 @@ fn of_files(args: &ImportArgs, files: Vec<PathBuf>, fps: f64) -> Result<Sequence
     Ok(sequence)
 }
 
-/// Returns the pose of a camera at a height above the floor that looks ahead, and down by an angle.
+/// Returns the pose of a camera at a height above the floor that looks ahead, tilted down by an
+/// angle.
 pub fn level(height_m: f64, down_deg: f64) -> nalgebra::Isometry3<f64> {
     // The lens does not matter for the pose; any valid one will do.
     Camera::mounted(Pinhole::centred(1.0, 1, 1), 1, 1, height_m, down_deg.to_radians(), 0.0)

@@ -1,4 +1,4 @@
-//! Scenes of Follow-Bench, as the benchmark publishes them for its simulator: a world with a robot, a
+//! Scenes of Follow-Bench in the format of the benchmark's simulator: a world with a robot, a
 //! target, people and rectangular obstacles (<https://github.com/MedlarTea/follow-bench>, folders
 //! `config` of `socialRPF/dynamic_scenarios` and `socialRPF/layout_scenarios`).
 
@@ -14,13 +14,13 @@ use super::args::ImportArgs;
 
 /// Longest run of the benchmark, s: 400 steps of 0.1 s.
 const DURATION_S: f64 = 40.0;
-/// Most people and obstacles that are read of a file.
+/// Largest number of people and obstacles in a file.
 const MOST: usize = 150;
 
-/// Writes a scene of the benchmark as a scene to simulate.
+/// Converts a scene of the benchmark to a scene to simulate.
 ///
 /// # Errors
-/// A file that cannot be read or holds something else: exit code 1; an output that exists: 2.
+/// Exit code 1 for a file that cannot be read or has another format; 2 for an output that exists.
 pub fn import(args: &ImportArgs) -> Outcome {
     let path = &args.path;
     let output = args.output.clone().unwrap_or_else(|| path.with_extension("toml"));
@@ -56,7 +56,7 @@ fn read(path: &Path) -> Result<Scene, Failure> {
 /// # Errors
 /// A sentence with the cause.
 pub fn scene_of_follow_bench(text: &str, about: &str) -> Result<Scene, String> {
-    // An alias copies what its anchor names, and a few of them fill any memory.
+    // An alias copies the content of its anchor, so that a few nested ones can fill the memory.
     if text.contains('&') {
         return Err("it has YAML anchors, which the benchmark does not use; write them out".into());
     }
@@ -77,7 +77,7 @@ pub fn scene_of_follow_bench(text: &str, about: &str) -> Result<Scene, String> {
     for (number, obstacle) in listed(&root["obstacle"], "obstacle")?.iter().enumerate() {
         scene.blocks.push(block(obstacle, &format!("obstacle {number}"), offset_m)?);
     }
-    // The rules of scenes hold for read ones, too.
+    // Imported scenes must also satisfy the rules of scenes.
     let text = toml::to_string(&scene).map_err(|error| error.to_string())?;
     Scene::parse(&text).map_err(|error| error.to_string())
 }
@@ -107,7 +107,7 @@ fn set_robot(scene: &mut Scene, robot: &Yaml, offset_m: [f64; 2]) -> Result<(), 
     Ok(())
 }
 
-/// Sets the walk of all people, which is that of the target.
+/// Sets the gait of all people to that of the target.
 fn set_crowd(reacting: &mut CrowdSettings, target: &Yaml) -> Result<(), String> {
     let behavior = &target["behavior"];
     reacting.radius_m = needed(&target["shape"]["radius"], "target.shape.radius")?;
@@ -181,7 +181,7 @@ fn size_m(shape: &Yaml, name: &str) -> Result<[f64; 2], String> {
     }
 }
 
-/// Returns a place in the room, m, and a heading, rad.
+/// Returns a position in the room, m, and a heading, rad.
 fn state(value: &Yaml, name: &str, offset_m: [f64; 2]) -> Result<[f64; 3], String> {
     let [x, y, heading_rad] =
         numbers(value).ok_or_else(|| format!("{name} must have three numbers"))?;
@@ -201,7 +201,7 @@ fn numbers<const COUNT: usize>(value: &Yaml) -> Option<[f64; COUNT]> {
     all?.try_into().ok()
 }
 
-/// Returns the entries of a list, which may be left out.
+/// Returns the entries of a list; a missing list is empty.
 fn listed<'a>(value: &'a Yaml, name: &str) -> Result<&'a [Yaml], String> {
     let entries = value.as_vec().map_or(&[][..], Vec::as_slice);
     if entries.len() > MOST {

@@ -1,5 +1,6 @@
 //! KITTI tracking (Geiger et al., CVPR 2012): `image_02` and `image_03` are the rectified colour
-//! pair, `calib` has their projections, `label_02` boxes of people, `oxts` the poses of the car.
+//! pair, `calib` has their projections, `label_02` has boxes of people, and `oxts` has the poses of
+//! the car.
 
 use std::f64::consts::PI;
 use std::fmt::Write as _;
@@ -114,16 +115,16 @@ fn boxes(path: &Path) -> Result<String, Failure> {
     Ok(out)
 }
 
-/// The failure on a line that is no label.
+/// Returns the failure for a line that is not a label.
 fn no_label(path: &Path, line: usize) -> Failure {
     Failure::failed(format!("{}:{line}: not a label of KITTI", path.display()))
 }
 
-/// Radius of the earth as KITTI's own tools take it, m.
+/// Radius of the earth in KITTI's own tools, m.
 const EARTH_M: f64 = 6_378_137.0;
 
-/// Converts latitude, longitude and heading to poses on a plane (Mercator, true in length at the
-/// first latitude), relative to the first one.
+/// Converts latitude, longitude and heading to poses on a plane (Mercator projection with true
+/// scale at the first latitude), relative to the first pose.
 fn drive(path: &Path) -> Result<Vec<Placed>, Failure> {
     let text = text(path, LAYOUT)?;
     let mut first: Option<Isometry3<f64>> = None;

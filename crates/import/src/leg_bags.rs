@@ -1,10 +1,11 @@
 //! People annotated in laser scans, in bags of leg_tracker_benchmarks (A. Leigh, J. Pineau, N. Olmedo,
 //! H. Zhang, *Person Tracking and Following with 2D Laser Scanners*, ICRA 2015).
 //!
-//! The scans are read from the bag as they are. The people are messages `leg_tracker/Person` (a pose in
-//! the frame of the laser, and an id; no header) on `/ground_truth_people_tracks`, recorded half way in
-//! time between the annotated scan and the next (`annotate_rosbags.py` there), so that a person belongs
-//! to the last scan before. What is between two annotations of a person is not filled in.
+//! The scans are read from the bag as they are. The people are messages `leg_tracker/Person` (a
+//! pose in the frame of the laser and an ID, without header) on `/ground_truth_people_tracks`.
+//! Their recording times are half way between the annotated scan and the next
+//! (`annotate_rosbags.py` there), so that a person belongs to the last scan before the message.
+//! Gaps between two annotations of a person are not filled.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -32,14 +33,14 @@ struct Person {
     id: u32,
 }
 
-/// Annotated person: time of recording, id, place in the frame of the laser.
+/// Annotated person: recording time, ID, and position in the frame of the laser.
 struct Annotated {
     log_time: u64,
     id: u32,
     at_m: [f64; 2],
 }
 
-/// Scan: time of recording, stamp, points in the frame of the laser.
+/// Scan: recording time, stamp, and points in the frame of the laser.
 struct Scan {
     log_time: u64,
     stamp_ns: u64,
@@ -58,7 +59,7 @@ struct Bag {
 /// Writes the annotations of a bag as `people-floor.csv`.
 ///
 /// # Errors
-/// A bag that cannot be read or has no annotations: exit code 1; an output that exists: 2.
+/// Exit code 1 for a bag that cannot be read or has no annotations; 2 for an output that exists.
 pub fn import(args: &ImportArgs) -> Outcome {
     let ending = "people-floor.csv";
     let output = args.output.clone().unwrap_or_else(|| args.path.with_extension(ending));
@@ -129,7 +130,7 @@ impl Bag {
         }
     }
 
-    /// Returns the scans of the topic that is told, or of the only one.
+    /// Returns the scans of the given topic, or of the only one.
     fn annotated_scans(&self, args: &ImportArgs) -> Result<&[Scan], Failure> {
         let topics = self.scans.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
         let shown = args.path.display();
@@ -178,7 +179,7 @@ fn table(bag: &Bag, args: &ImportArgs) -> Result<(String, usize), Failure> {
             let why = "an annotation before the first scan; is --scan the annotated topic?";
             return Err(Failure::failed(format!("{}: {why}", args.path.display())));
         };
-        // A person who was annotated again is where the last click was.
+        // If a person was annotated twice, the last annotation counts.
         rows.insert((number, *id), *at_m);
     }
     let mut out = "stamp_s,scan,id,x_laser_m,y_laser_m,points,ignore,source\n".to_owned();

@@ -1,6 +1,6 @@
-//! `tagalong import`: data sets and folders of images become logs.
+//! `tagalong import`: converts data sets and folders of images to logs.
 //!
-//! Each kind is a module that reads its layout into a `Sequence`; one writer makes a log of it.
+//! Each layout has a module that reads it into a `Sequence`, and one writer converts this to a log.
 //! No other part of Tagalong knows these layouts.
 //!
 //! ```
@@ -45,8 +45,8 @@ use self::sequence::Sequence;
 /// Imports a data set.
 ///
 /// # Errors
-/// A path with unexpected content, or a file in it that cannot be read: exit code 1; a log that
-/// exists or cannot be written: 2.
+/// Exit code 1 for a path with unexpected content, or with a file that cannot be read; 2 for a log
+/// that exists or cannot be written.
 pub fn import(args: &ImportArgs) -> Outcome {
     let path = &args.path;
     if !path.exists() {
@@ -72,7 +72,7 @@ pub fn import(args: &ImportArgs) -> Outcome {
     let sequence = read(args)?;
     make_room_for(&log)?;
     writer::write(&sequence, &log, &signals).inspect_err(|_| {
-        // A log without its end would pass for the whole sequence.
+        // An incomplete log would be taken for the complete sequence.
         let _ = std::fs::remove_file(&log);
     })?;
     beside(&sequence, &log)?;
@@ -100,7 +100,7 @@ pub fn import(args: &ImportArgs) -> Outcome {
     Ok(Ended::Well)
 }
 
-/// Returns the message on a file in the place of a folder of images.
+/// Returns the message for a file that is given instead of a folder of images.
 fn file_for_folder(path: &Path) -> String {
     let shown = path.display();
     let ending = path.extension().and_then(|it| it.to_str()).unwrap_or_default().to_lowercase();

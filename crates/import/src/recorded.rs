@@ -5,13 +5,13 @@ use std::path::Path;
 use tagalong_app::outcome::Failure;
 use toml::Table;
 
-/// The shipped config, which is changed as little as possible.
+/// The shipped config, of which only a few lines are replaced.
 const SHIPPED: &str = include_str!("../configs/recorded.toml");
 
 /// Returns the config that tracks the whole bodies of a `det.txt`.
 ///
 /// # Errors
-/// A path that has no absolute form.
+/// A path that cannot be made absolute.
 pub fn config(detections: &Path) -> Result<String, Failure> {
     let whole = detections.canonicalize().map_err(|error| {
         Failure::failed(format!("cannot read {}: {error}", detections.display()))

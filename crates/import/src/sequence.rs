@@ -1,4 +1,4 @@
-//! Common form of all layouts.
+//! Common representation of all layouts.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,12 +13,13 @@ use super::args::ImportArgs;
 /// Start time of a sequence without a clock.
 pub const EPOCH: Stamp = Stamp::from_nanos(1_700_000_000_000_000_000);
 
-/// Focal lengths in both directions and the centre, pixels, and the distortion by `plumb_bob`.
+/// Intrinsics of a camera: focal lengths in both directions and the principal point, pixels, and
+/// the `plumb_bob` distortion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Calibration {
     /// Focal lengths, pixels.
     pub focal: [f64; 2],
-    /// Centre, pixels; `None`: that of the image.
+    /// Principal point, pixels; `None`: the centre of the image.
     pub centre: Option<[f64; 2]>,
     /// Distortion.
     pub distortion: [f64; 5],
@@ -46,14 +47,14 @@ pub struct Moment {
     pub file: PathBuf,
 }
 
-/// Pose at a moment.
+/// Pose at a point in time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placed {
     /// Time of the pose.
     pub stamp: Stamp,
     /// Pose of the robot, on the floor, in the odometry frame.
     pub odom_from_robot: Isometry3<f64>,
-    /// Pose of the camera on it; `None` if it does not move.
+    /// Pose of the camera on the robot; `None` if it does not move.
     pub robot_from_camera: Option<Isometry3<f64>>,
 }
 
@@ -72,9 +73,9 @@ pub struct Sequence {
     pub mount: Option<Isometry3<f64>>,
     /// Poses of the robot.
     pub placed: Vec<Placed>,
-    /// Files that go beside the log: their ending, and their text.
+    /// Files that are written beside the log: their ending and their text.
     pub beside: Vec<(&'static str, String)>,
-    /// Config that tracks the recorded detections of the sequence, where it has some.
+    /// Config that tracks the recorded detections of the sequence, if it has any.
     pub recorded: Option<String>,
     /// Notes for the user.
     pub notes: Vec<String>,
@@ -83,7 +84,7 @@ pub struct Sequence {
 /// Reads a text file of a layout.
 ///
 /// # Errors
-/// A missing file: the folder is not of that layout.
+/// A missing file, which means that the folder has another layout.
 pub fn text(path: &Path, layout: &str) -> Result<String, Failure> {
     read_text(path, FileLimit::Table).map_err(|error| {
         let shown = path.display();
@@ -97,7 +98,7 @@ pub fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     numbered.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
 }
 
-/// Parses seconds with a fraction, without rounding them.
+/// Parses seconds with a fraction exactly.
 pub fn stamp(word: &str) -> Option<Stamp> {
     // A double cannot hold nanoseconds of today's times, so the digits are parsed as integers.
     let (seconds, fraction) = word.split_once('.').unwrap_or((word, "0"));
@@ -109,7 +110,7 @@ pub fn stamp(word: &str) -> Option<Stamp> {
 /// Returns the blank-separated numbers of a line.
 ///
 /// # Errors
-/// A word that is no number, with the file and the line.
+/// A word that is not a number, with the file and the line.
 pub fn numbers<'a>(
     words: impl Iterator<Item = &'a str>,
     path: &Path,
@@ -123,10 +124,11 @@ pub fn numbers<'a>(
         .collect()
 }
 
-/// Endings of the images that are taken as they are.
+/// File name extensions of images that are copied unchanged.
 pub const PICTURES: [&str; 3] = ["jpg", "jpeg", "png"];
 
-/// Returns the JPEG and PNG files of a folder, by name, and by number where names are numbered.
+/// Returns the JPEG and PNG files of a folder, sorted by name, with numbers in names in numerical
+/// order.
 ///
 /// # Errors
 /// A folder that cannot be read.
@@ -134,8 +136,8 @@ pub fn pictures(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     files(folder, &PICTURES)
 }
 
-/// Returns the files of a folder with one of the endings, by name, and by number where names are
-/// numbered.
+/// Returns the files of a folder with one of the extensions, sorted by name, with numbers in names
+/// in numerical order.
 ///
 /// # Errors
 /// A folder that cannot be read.
@@ -168,7 +170,7 @@ fn counted(path: &Path) -> Vec<(String, u64)> {
     parts
 }
 
-/// Returns files at a steady rate.
+/// Returns files with times at a constant rate.
 pub fn steady(files: Vec<PathBuf>, eye: Eye, hz: f64) -> impl Iterator<Item = Moment> {
     files.into_iter().enumerate().map(move |(index, file)| Moment {
         stamp: EPOCH.plus_seconds(index as f64 / hz),
@@ -178,7 +180,7 @@ pub fn steady(files: Vec<PathBuf>, eye: Eye, hz: f64) -> impl Iterator<Item = Mo
 }
 
 impl ImportArgs {
-    /// Returns the lens of the options, for images of so many columns.
+    /// Returns the lens of the options, for images with this number of columns.
     pub fn calibration(&self, columns: u32) -> Option<Calibration> {
         let half = 0.5 * f64::from(columns);
         let by_view = self.view.map(|view| half / (0.5 * view.to_radians()).tan());
@@ -190,7 +192,7 @@ impl ImportArgs {
 /// Returns the columns and rows of an image file.
 ///
 /// # Errors
-/// A file that is no image.
+/// A file that is not an image.
 pub fn size(file: &Path) -> Result<(u32, u32), Failure> {
     image::image_dimensions(file)
         .map_err(|error| Failure::failed(format!("cannot read {}: {error}", file.display())))

@@ -1,4 +1,4 @@
-//! Truth of a data set in the forms that `eval` reads.
+//! Truth of a data set in the formats that `eval` reads.
 
 use std::fmt::Write as _;
 
@@ -11,17 +11,17 @@ use tagalong_eval::formats::people::{self, Row};
 pub struct WholeBody {
     /// Number of the colour image, from 1.
     pub frame: u32,
-    /// Id of the person.
+    /// ID of the person.
     pub id: i64,
     /// Box, pixels.
     pub region: Region,
     /// Visible part of the body, 0 to 1.
     pub visible: f64,
-    /// False: neither a miss nor a false alarm.
+    /// False for a person that counts neither as a miss nor as a false positive.
     pub counts: bool,
 }
 
-/// Returns whole bodies as MOTChallenge text, in which `eval` finds the upper ones.
+/// Returns whole bodies as MOTChallenge text, from which `eval` derives the upper bodies.
 pub fn boxes_csv(bodies: &[WholeBody]) -> String {
     let mut out = String::new();
     for WholeBody { frame, id, region, visible, counts } in bodies {

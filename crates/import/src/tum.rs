@@ -1,10 +1,10 @@
 //! Folders of the TUM RGB-D benchmark (Sturm et al., IROS 2012): `rgb.txt` and `depth.txt` list
-//! images with their times, `groundtruth.txt` the poses of the camera in a room with the floor at z
-//! = 0; depth has 5000 units per metre.
+//! images with their times, and `groundtruth.txt` the poses of the camera in a room whose floor is
+//! at z = 0; depth has 5000 units per metre.
 //!
-//! The Bonn RGB-D dynamic dataset (Palazzolo et al., IROS 2019) has the same layout and unit, and folders
-//! named `rgbd_bonn_*`. Its poses are left out: they are those of markers on the camera, in a frame
-//! whose floor is not told.
+//! The Bonn RGB-D dynamic dataset (Palazzolo et al., IROS 2019) has the same layout and unit, and
+//! folders named `rgbd_bonn_*`. Its poses are not imported: they are those of markers on the
+//! camera, in a frame whose floor is unknown.
 
 use std::path::Path;
 
@@ -61,7 +61,7 @@ fn is_bonn(folder: &Path) -> bool {
     folder.to_string_lossy().contains("rgbd_bonn")
 }
 
-/// Returns the colour camera as the benchmark publishes it, by the name of the folder.
+/// Returns the published intrinsics of the colour camera, by the name of the folder.
 fn calibration(folder: &Path, notes: &mut Vec<String>) -> Calibration {
     let name = folder.to_string_lossy();
     let (focal, centre, distortion) = if name.contains("freiburg1") {
@@ -84,7 +84,7 @@ fn calibration(folder: &Path, notes: &mut Vec<String>) -> Calibration {
     Calibration { focal, centre: Some(centre), distortion }
 }
 
-/// Reads a list of images. Images that are not there, as in parts of a sequence, are left out.
+/// Reads a list of images. Missing images, for example in a part of a sequence, are left out.
 fn images(
     folder: &Path,
     list: &str,
@@ -119,7 +119,8 @@ fn stamp(word: &str, path: &Path, line: usize) -> Result<Stamp, Failure> {
         .ok_or_else(|| Failure::failed(format!("{}:{line}: `{word}` is no time", path.display())))
 }
 
-/// Returns the poses of the robot: the point on the floor below the camera, heading where it looks.
+/// Returns the poses of the robot: at the point on the floor below the camera, with the heading of
+/// its optical axis.
 fn poses(path: &Path) -> Result<Vec<Placed>, Failure> {
     let text = text(path, LAYOUT)?;
     lines(&text)

@@ -1,4 +1,4 @@
-//! Writes a sequence as a log with the topics that robots use.
+//! Writing of a sequence as a log with the topics that robots use.
 
 use std::path::Path;
 
@@ -18,10 +18,10 @@ const RIGHT_FRAME: &str = "camera_right_optical_frame";
 const ROBOT_FRAME: &str = "base_link";
 const ODOM_FRAME: &str = "odom";
 
-/// Writes the log, until a signal comes.
+/// Writes the log until the end or a signal.
 ///
 /// # Errors
-/// An image that cannot be read is exit code 1, a log that cannot be written 2.
+/// Exit code 1 for an image that cannot be read; 2 for a log that cannot be written.
 pub fn write(sequence: &Sequence, path: &Path, signals: &Signals) -> Result<(), Failure> {
     let mut log = MessageLog::create(path).map_err(Failure::usage)?;
     let start = sequence.moments.first().map_or(Stamp::default(), |moment| moment.stamp);
@@ -31,7 +31,7 @@ pub fn write(sequence: &Sequence, path: &Path, signals: &Signals) -> Result<(), 
     }
     let mut places = sequence.placed.iter().peekable();
     for moment in sequence.moments.iter().take_while(|_| signals.received().is_none()) {
-        // A pose goes before the image that it is for.
+        // A pose is written before its image.
         while let Some(placed) = places.next_if(|placed| placed.stamp <= moment.stamp) {
             place(&mut log, placed).map_err(Failure::failed)?;
         }
@@ -93,19 +93,19 @@ fn info(
     Some(CameraInfo::of_lens(header, &lens, (width as usize, height as usize), aside_m))
 }
 
-/// Reads the bytes of an image, and decodes it to its end.
+/// Reads the bytes of an image, and checks that it can be decoded completely.
 fn whole_image(file: &Path) -> Result<(Vec<u8>, DynamicImage), Failure> {
     let data = read_bytes(file, FileLimit::Image).map_err(|error| unusable_file(file, &error))?;
     let decoded = image::load_from_memory(&data).map_err(|error| unusable_file(file, &error))?;
     Ok((data, decoded))
 }
 
-/// The failure on a file that is no image that can be read.
+/// Returns the failure for a file that is not a readable image.
 fn unusable_file(file: &Path, why: &dyn std::fmt::Display) -> Failure {
     Failure::failed(format!("cannot use {}: {why}", file.display()))
 }
 
-/// Writes a 16-bit PNG as millimetres.
+/// Writes a 16-bit PNG as a depth image in millimetres.
 fn depth(
     log: &mut MessageLog,
     unit_m: f64,

@@ -1,12 +1,12 @@
-/// Means of the gradient and of its squares fade by these parts a step.
+/// Decay rates per step of the means of the gradient and of its squares.
 const FADE: [f32; 2] = [0.9, 0.999];
-/// A gradient longer than this is shortened.
+/// Largest norm of the gradient; a longer one is scaled down.
 const LONGEST: f32 = 1.0;
-/// Part of a training in which the rate rises.
+/// Fraction of the training in which the learning rate rises.
 const WARM: f64 = 0.1;
 
-/// Steps of adaptive size (Kingma and Ba, ICLR 2015), with weights that shrink beside
-/// them (Loshchilov and Hutter, ICLR 2019).
+/// The optimiser Adam (Kingma and Ba, ICLR 2015), with decoupled weight decay (Loshchilov and
+/// Hutter, ICLR 2019).
 #[derive(Clone, Debug, Default)]
 pub struct Adam {
     steps: i32,
@@ -15,8 +15,8 @@ pub struct Adam {
 }
 
 impl Adam {
-    /// Changes the weights, which come in parts of any size, against the gradient, which comes in
-    /// the same parts.
+    /// Takes a step of the weights against the gradient; both are given in the same parts, of any
+    /// size.
     pub fn step<'a>(
         &mut self,
         weights: impl IntoIterator<Item = &'a mut [f32]>,
@@ -44,8 +44,8 @@ impl Adam {
     }
 }
 
-/// Returns the factor of the rate when this part of a training is done: it warms up, and falls to
-/// zero as a cosine (Loshchilov and Hutter, ICLR 2017).
+/// Returns the factor of the learning rate after this fraction of a training: it rises linearly,
+/// and then falls to zero as a cosine (Loshchilov and Hutter, ICLR 2017).
 pub fn pace(part: f64) -> f64 {
     if part < WARM {
         part / WARM

@@ -4,8 +4,8 @@
 
 /// Number of levels to which the values of a feature are quantised.
 const LEVELS: usize = 256;
-/// Fraction of the total weight that is kept by weight trimming; lighter samples do not take part
-/// in the choice of a question.
+/// Fraction of the total weight that weight trimming keeps; samples with less weight do not take
+/// part in the choice of a question.
 const DECISIVE: f32 = 0.98;
 
 /// Quantised values of features, feature by feature.
@@ -33,8 +33,8 @@ impl Levels {
         self.samples
     }
 
-    /// Adds a feature: its value in each sample. The levels reach three standard deviations to
-    /// either side of the mean; values beyond are clamped to the ends.
+    /// Adds a feature, given by its value in each sample. The levels span three standard deviations
+    /// on either side of the mean; values beyond are clamped to the ends.
     pub fn push(&mut self, values: impl Iterator<Item = f32> + Clone) {
         let count = self.samples.max(1) as f32;
         let mean = values.clone().sum::<f32>() / count;
@@ -60,12 +60,12 @@ impl Levels {
     }
 }
 
-/// Continuation of a tree after a question.
+/// Branch of a tree after a question.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Next {
     /// Index of another question of the tree.
     Question(usize),
-    /// End of the path, with this value, -1 to 1.
+    /// Leaf with this value, -1 to 1.
     Leaf(f32),
 }
 
@@ -76,7 +76,7 @@ pub struct Question {
     pub feature: usize,
     /// Threshold: the answer is yes for values below it.
     pub below: f32,
-    /// Continuations for yes and for no.
+    /// Branches for yes and for no.
     pub next: [Next; 2],
 }
 
@@ -126,7 +126,7 @@ impl<'a> Boosting<'a> {
         tree
     }
 
-    /// Returns the heaviest samples, in the order of the table.
+    /// Returns the samples with the largest weights, in the order of the table.
     fn decisive(&self) -> Vec<u32> {
         let mut sorted = self.weights.clone();
         sorted.sort_by(|a, b| b.total_cmp(a));
@@ -150,7 +150,7 @@ struct Growing<'a> {
 
 impl Growing<'_> {
     /// Adds a question that is fitted to the samples `chosen`, and further ones below it; `all`
-    /// samples that reach a leaf are given its value.
+    /// samples that reach a leaf get its value.
     fn node(&mut self, chosen: &[u32], all: &[u32], depth: usize) -> usize {
         let table = self.of.table;
         let (feature, level) = self.best(chosen);
@@ -286,7 +286,7 @@ mod tests {
             .map(|level| squared_error(&numbers, &truth, table.threshold(0, level - 1)))
             .fold(f64::MAX, f64::min);
         let error = squared_error(&numbers, &truth, tree[0].below);
-        // Samples of very little weight do not count, so it is not exactly the least.
+        // Samples with very little weight are ignored, so it is not exactly the least.
         assert!(error < least + 0.01, "{error} {least}");
     }
 

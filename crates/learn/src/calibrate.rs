@@ -11,8 +11,8 @@ pub struct Line {
 
 /// Fits Platt's logistic calibration with smoothed targets (Platt 1999). Both classes have equal
 /// weight, so that the line gives the log-likelihood ratio without the prior; `linfa`'s Platt
-/// scaling, which knows no weights, gives the same line where both classes are as frequent. The
-/// values have to come from data that the classifier was not fitted to.
+/// scaling, which has no weights, gives the same line if both classes are equally frequent. The
+/// values have to come from data to which the classifier was not fitted.
 pub fn platt(values: &[(f64, bool)]) -> Line {
     let people = values.iter().filter(|(_, is_person)| *is_person).count() as f64;
     let others = values.len() as f64 - people;
@@ -32,8 +32,8 @@ pub fn platt(values: &[(f64, bool)]) -> Line {
 }
 
 /// Fits a rising calibration of probabilities by isotonic regression (Zadrozny and Elkan 2002): the
-/// probabilities are counted in so many steps, neighbouring steps whose shares fall are merged, and
-/// each of the rest becomes a pair of its mean probability and of the share that is true.
+/// probabilities are binned, adjacent bins with decreasing shares are merged, and each remaining
+/// bin gives a pair of its mean probability and the share that is true.
 ///
 /// ```
 /// let stated = [(0.25, false), (0.25, false), (0.75, true), (0.75, false)];
@@ -62,7 +62,7 @@ pub fn isotonic(stated: &[(f64, bool)], steps: usize) -> Vec<[f64; 2]> {
     merged.iter().map(|step| [step.sum / step.count, step.share()]).collect()
 }
 
-/// Probabilities within a step of the calibration.
+/// Bin of the calibration.
 #[derive(Clone, Copy, Debug, Default)]
 struct Step {
     count: f64,

@@ -1,12 +1,13 @@
-//! A layer of a convolutional network, forwards and backwards, for networks that are small enough
-//! to be trained here: channels are constants, so that the innermost loops are registers.
+//! Layers of convolutional networks, with forward and backward pass, for networks that are small
+//! enough to be trained here. Numbers of channels are constants, so that the innermost loops run in
+//! registers.
 
 use std::ops::Range;
 
-/// Weights are summed in so many parts at once, a register's width or a part of one.
+/// Number of lanes that are summed at once, the width of a register or a fraction of it.
 const LANES: usize = 8;
 
-/// Outputs beside each other that are computed at once: their sums are independent.
+/// Number of adjacent outputs that are computed at once: their sums are independent.
 const BLOCK: usize = 4;
 
 /// An image of `CHANNELS` numbers per cell, row by row.
@@ -66,9 +67,9 @@ pub struct Conv<
     const STRIDE: usize = 2,
     const DILATION: usize = 1,
 > {
-    /// Of each tap, row by row, of each input: the weights of the outputs.
+    /// Weights of the outputs, for each tap, row by row, and each input.
     pub weights: Vec<f32>,
-    /// Of each output.
+    /// Bias of each output.
     pub bias: Vec<f32>,
 }
 
@@ -93,7 +94,7 @@ impl<
     const DILATION: usize,
 > Conv<IN, OUT, SIZE, STRIDE, DILATION>
 {
-    /// Inputs of one output, which decide how large weights are at the start.
+    /// Number of inputs of one output, which determines the size of the initial weights.
     pub const INPUTS: usize = SIZE * SIZE * IN;
 
     /// Returns the weights and the biases.
@@ -106,20 +107,19 @@ impl<
         [&mut self.weights, &mut self.bias]
     }
 
-    /// Computes the sums, with those below zero cut off.
+    /// Computes the rectified sums.
     #[inline(always)]
     pub fn forward(&self, input: &Map<IN>, out: &mut Map<OUT>) {
         self.apply(input, out, |_| true, |sum| sum.max(0.0));
     }
 
-    /// Computes the sums, with those below zero cut off, in the cells that are `wanted`; all
-    /// others are zero.
+    /// Computes the rectified sums in the cells that are `wanted`; all others are zero.
     #[inline(always)]
     pub fn forward_where(&self, input: &Map<IN>, wanted: &[bool], out: &mut Map<OUT>) {
         self.apply(input, out, |cell| wanted[cell], |sum| sum.max(0.0));
     }
 
-    /// Computes the sums as they are, in the cells that are `wanted`; all others are zero.
+    /// Computes the sums without rectification in the cells that are `wanted`; all others are zero.
     #[inline(always)]
     pub fn linear_where(&self, input: &Map<IN>, wanted: &[bool], out: &mut Map<OUT>) {
         self.apply(input, out, |cell| wanted[cell], |sum| sum);
@@ -178,8 +178,9 @@ impl<
         sums
     }
 
-    /// Returns the sums of an output and of those to its right, all of whose columns are inside of the
-    /// image. One addition waits for another in the sums of one output, but not in those of several.
+    /// Returns the sums of an output and of those to its right, all of whose columns are inside of
+    /// the image. Additions to the sum of one output depend on each other, but those of several
+    /// outputs do not.
     #[inline(always)]
     fn block(&self, input: &Map<IN>, [row, column]: [usize; 2]) -> [[f32; OUT]; BLOCK] {
         let weights = self.weights.as_chunks::<OUT>().0;
@@ -202,7 +203,7 @@ impl<
         sums
     }
 
-    /// Returns the columns of outputs that see no column outside of an image.
+    /// Returns the columns of outputs whose taps are all inside of an image.
     fn full_columns(seen: usize, columns: usize) -> Range<usize> {
         let mut all = 0..columns;
         let first = all.find(|column| Self::taps(*column, seen) == (0..SIZE)).unwrap_or(columns);
@@ -210,9 +211,9 @@ impl<
         first..end
     }
 
-    /// Adds how the loss depends on the weights to `gradient`, and how it depends on the
-    /// input to `of_input`, if that is asked for. `of_out` is how it depends on the
-    /// output; where the output is cut off, it has to be zero.
+    /// Adds the gradient of the loss by the weights to `gradient`, and that by the input to
+    /// `of_input`, if that is given. `of_out` is the gradient by the output; it has to be zero
+    /// where the output is rectified.
     #[inline(always)]
     pub fn backward(
         &self,
@@ -265,7 +266,7 @@ impl<
         first..SIZE.min((size + reach - STRIDE * out).div_ceil(DILATION))
     }
 
-    /// Returns the cell that an output sees through a tap inside the image.
+    /// Returns the cell of a tap of an output, which is inside the image.
     #[inline(always)]
     fn place(out: [usize; 2], tap: [usize; 2]) -> [usize; 2] {
         let reach = DILATION * (SIZE / 2);

@@ -1,6 +1,7 @@
-//! Algebra of large matrices for trainers, by `faer` and on one thread, so that a fit has the same
-//! bytes on any number of them. Processors with other vector instructions may round otherwise,
-//! which is why pipelines do without it. Small matrices of fixed size are `nalgebra`'s.
+//! Algebra of large matrices for trainers, with `faer` on one thread, so that a fit has the same
+//! bytes whatever the number of threads. Processors with other vector instructions may round
+//! differently, and therefore pipelines do not use this module. Small matrices of fixed size use
+//! `nalgebra`.
 
 use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
@@ -78,7 +79,7 @@ impl NormalEquations {
     }
 }
 
-/// Returns the products of the columns with a vector that has a number for each row.
+/// Returns the products of the columns with a vector that has one element per row.
 ///
 /// # Panics
 /// If the vector has another length than the columns.

@@ -3,8 +3,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use tagalong_config::Example;
 use tagalong_math::mix;
 
-/// Deals the groups out to `folds` parts, those with people and those without in turn, so that each
-/// part has both. The deal depends on the seed, not on the order of the examples.
+/// Distributes the groups over `folds` parts, those with people and those without in turn, so that
+/// each part has both. The distribution depends on the seed, not on the order of the examples.
 pub fn parts(
     examples: impl Iterator<Item = Example>,
     folds: usize,
@@ -33,15 +33,15 @@ pub fn parts(
 /// Purpose of a group of examples.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Use {
-    /// The figures of the model card; no classifier is fitted to it.
+    /// Computation of the figures of the model card; no classifier is fitted to these examples.
     Figures,
-    /// The calibration of a classifier that has not seen it.
+    /// Calibration of a classifier that was not fitted to these examples.
     Calibration,
-    /// Fitting of the classifier.
+    /// Fit of the classifier.
     Fit,
 }
 
-/// Tenth of the groups that calibrates by default.
+/// Tenth of the groups that is used for calibration by default.
 pub const CALIBRATION: u64 = 2;
 
 /// Returns the pseudo-random tenth of all groups that a group is in, 0 to 9.
@@ -49,9 +49,9 @@ fn tenth_of(group: u64) -> u64 {
     mix(group) % 10
 }
 
-/// Returns the purpose of a group: two tenths are for the figures, those of `calibration` for the
-/// calibration, and the others for fitting. Cross-validation passes other tenths in turn and never
-/// touches the figures.
+/// Returns the purpose of a group: two tenths are for the figures, the tenths of `calibration` for
+/// the calibration, and the others for the fit. Cross-validation passes other tenths in turn and
+/// never uses those of the figures.
 pub fn use_of(group: u64, calibration: &[u64]) -> Use {
     match tenth_of(group) {
         0 | 1 => Use::Figures,

@@ -6,7 +6,7 @@ const STEPS: usize = 100;
 /// Feature vector with the probability of the positive class.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Example<const N: usize> {
-    /// Features; one that is always 1 makes an offset.
+    /// Features; a feature that is always 1 gives an offset.
     pub features: [f64; N],
     /// Probability of the positive class, 0 to 1.
     pub target: f64,
@@ -53,7 +53,7 @@ fn improved<const N: usize>(
         .unwrap_or(*weights)
 }
 
-/// Returns the cross-entropy, in a form that cannot overflow, plus the ridge.
+/// Returns the cross-entropy, in a form that cannot overflow, plus the ridge penalty.
 fn loss<const N: usize>(weights: &SVector<f64, N>, examples: &[Example<N>], ridge: f64) -> f64 {
     let each = examples.iter().map(|Example { features, target, weight }| {
         let f = weights.dot(&SVector::from(*features));

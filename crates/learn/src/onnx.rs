@@ -1,7 +1,7 @@
-//! Networks written as ONNX files, so that other programs can run them.
+//! Export of networks as ONNX files, so that other programs can run them.
 //!
-//! A file is a Protocol Buffers message, `ModelProto` of [`onnx.proto`]; the few fields that a
-//! network needs are written here.
+//! A file is a Protocol Buffers message, `ModelProto` of [`onnx.proto`]; this module writes the few
+//! fields that a network needs.
 //!
 //! [`onnx.proto`]: https://github.com/onnx/onnx/blob/main/onnx/onnx.proto
 
@@ -26,7 +26,7 @@ pub enum Attribute<'a> {
     Ints(&'a [i64]),
 }
 
-/// Graph of a network that becomes an ONNX file: operators in the order of their computation.
+/// Graph of a network for an ONNX file: operators in the order of their computation.
 #[derive(Clone, Debug, Default)]
 pub struct OnnxGraph {
     name: String,
@@ -53,7 +53,7 @@ impl OnnxGraph {
         self.outputs.push(port(name, shape));
     }
 
-    /// Adds a note that programs show with the file: a key and its text.
+    /// Adds an entry of metadata: a key and its text.
     pub fn note(&mut self, key: &str, text: &str) {
         self.notes.push((key.to_owned(), text.to_owned()));
     }
@@ -99,7 +99,7 @@ impl OnnxGraph {
         self.nodes.push(node);
     }
 
-    /// Adds a convolution; its constants are called as its output, with an ending.
+    /// Adds a convolution; the names of its constants are that of its output, with a suffix.
     pub fn conv<
         const IN: usize,
         const OUT: usize,
@@ -115,7 +115,7 @@ impl OnnxGraph {
         let weights = format!("{output}.weights");
         let bias = format!("{output}.bias");
         let mut turned = Vec::with_capacity(conv.weights.len());
-        // A file has the weights by output, by input, by tap.
+        // A file has the weights in the order output, input, tap.
         for out in 0..OUT {
             for input in 0..IN {
                 turned.extend(

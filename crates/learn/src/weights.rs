@@ -2,10 +2,10 @@ use std::fmt::Write;
 
 use crate::Line;
 
-/// Numbers in a line of the file.
+/// Number of values in a line of the file.
 const COLUMNS: usize = 16;
 
-/// The text file of a network: the weights of its parts by name, and the line that calibrates its
+/// Text file of a network: the weights of its parts by name, and the linear calibration of its
 /// output.
 ///
 /// ```

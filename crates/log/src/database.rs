@@ -186,6 +186,13 @@ fn stored(row: &Row<'_>) -> rusqlite::Result<Stored> {
 }
 
 fn no_database(why: rusqlite::Error) -> NotMcap {
+    use rusqlite::ErrorCode::{DatabaseCorrupt, NotADatabase};
+    // The first bytes were those of a database.
+    if matches!(why.sqlite_error_code(), Some(DatabaseCorrupt | NotADatabase)) {
+        return NotMcap(format!(
+            "the database is damaged or cut off: {why}; copy it again from the robot"
+        ));
+    }
     NotMcap(format!("not a rosbag2 database: {why}"))
 }
 

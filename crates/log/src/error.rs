@@ -1,3 +1,4 @@
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use crate::camera_info::CalibrationError;
@@ -29,7 +30,7 @@ pub enum LogError {
         /// Kind of the path.
         kind: &'static str,
         /// Advice for the user.
-        remedy: &'static str,
+        remedy: Cow<'static, str>,
     },
     /// The file is compressed and cannot be unpacked.
     #[error("`{}` is compressed: {why}", path.display())]

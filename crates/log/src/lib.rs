@@ -59,6 +59,7 @@ pub use obstacles::{ObstacleKind, ObstacleTopic};
 pub use packed::LogFile;
 pub use source::{FrameSource, Listening, LiveSource, LogFacts, LogFrame};
 pub use tagalong_core::{Input, Inputs, Usage};
+pub use tally::is_loss;
 pub use timing::{Skew, Timing};
 pub use topics::{InputAccount, TopicUse};
 pub use truth::{TRUTH_SCHEMA, TruthFrame, TruthJoint, TruthPerson, read_truth, read_truth_lines};

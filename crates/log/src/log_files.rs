@@ -46,15 +46,13 @@ impl LogFiles {
         let names: Vec<&str> = parts.iter().map(|part| part_name(part)).collect();
         let is_split = names.windows(2).all(|pair| pair[0] == pair[1]);
         if parts.is_empty() || (listed.is_none() && !is_split) {
-            return Err(LogError::NotAFile {
-                path: path.to_owned(),
-                kind: "a folder, and not one log",
-                remedy: if parts.is_empty() {
-                    ": it holds no .mcap and no .db3"
-                } else {
-                    " of those in it"
-                },
-            });
+            let remedy = if parts.is_empty() {
+                without_parts(path).into()
+            } else {
+                " of those in it".into()
+            };
+            let kind = "a folder, and not one log";
+            return Err(LogError::NotAFile { path: path.to_owned(), kind, remedy });
         }
         // Only the file names count, because the metadata may come from another machine.
         let mut missing = listed.unwrap_or_default();
@@ -87,7 +85,18 @@ pub(crate) fn open_file(path: &Path) -> Result<File, LogError> {
     } else {
         ("a pipe or a device", "; a pipe can be written to a file first")
     };
-    Err(LogError::NotAFile { path: path.to_owned(), kind, remedy })
+    Err(LogError::NotAFile { path: path.to_owned(), kind, remedy: remedy.into() })
+}
+
+/// Tells what a folder holds that is not one log of rosbag2.
+fn without_parts(folder: &Path) -> String {
+    let mut remedy = ": it holds no .mcap and no .db3".to_owned();
+    let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let bags = files.filter(|file| file.path().extension().is_some_and(|it| it == "bag")).count();
+    if bags > 0 {
+        remedy += &format!(", but {bags} .bag: name one of them");
+    }
+    remedy
 }
 
 /// Returns the name of a file without the extension of a compressed one.
@@ -218,6 +227,9 @@ mod tests {
         let error = LogFiles::of(logs.path()).unwrap_err().to_string();
         assert!(error.contains("not one log") && error.contains("of those in it"), "{error}");
         let error = LogFiles::of(folder(&["a.txt"]).path()).unwrap_err().to_string();
-        assert!(error.contains("holds no .mcap and no .db3"), "{error}");
+        assert!(error.ends_with("holds no .mcap and no .db3"), "{error}");
+        let bags = folder(&["a.bag", "b.bag", "c.txt"]);
+        let error = LogFiles::of(bags.path()).unwrap_err().to_string();
+        assert!(error.ends_with("no .db3, but 2 .bag: name one of them"), "{error}");
     }
 }

@@ -7,7 +7,7 @@ mod common;
 use common::{LogWriter, SavedLog, at, camera, level_pose, sweep};
 use nalgebra::{Isometry3, Vector3};
 use tagalong_core::Stamp;
-use tagalong_log::msgs::{CompressedImage, Float32Msg, Header, Image, Pose, encode};
+use tagalong_log::msgs::{CompressedImage, Float32Msg, Header, Image, LaserScan, Pose, encode};
 use tagalong_log::{
     CameraSettings, FrameSource, Input, InputSettings, Inputs, LogError, StampSource, TopicUse,
 };
@@ -542,7 +542,7 @@ fn the_unit_of_depth_is_that_of_its_own_camera() {
 
 #[test]
 fn all_scanners_of_the_robot_are_used_and_others_are_told() {
-    for (first, second, frame, is_used) in [
+    for (first, second, frame_id, is_used) in [
         ("/scan_front", "/scan_rear", "rear", true),
         ("/scan", "/back/scan", "rear", true),
         ("/laser/left/scan", "/laser/right/scan", "rear", true),
@@ -553,7 +553,7 @@ fn all_scanners_of_the_robot_are_used_and_others_are_told() {
         log.fixed("base_link", "front", &Isometry3::translation(0.2, 0.0, 0.3));
         log.fixed("base_link", "rear", &Isometry3::translation(-0.2, 0.0, 0.3));
         for index in 0..4 {
-            for (topic, frame) in [(first, "front"), (second, frame)] {
+            for (topic, frame) in [(first, "front"), (second, frame_id)] {
                 log.message(topic, recorded(index), &sweep(recorded(index), frame));
             }
         }
@@ -563,7 +563,58 @@ fn all_scanners_of_the_robot_are_used_and_others_are_told() {
         let told = entry(&source, second);
         assert_eq!(told.used_as.is_some() && told.problem.is_none(), is_used, "{told}");
         assert_eq!(told.problem.is_none(), is_used, "{told}");
+        // A second topic of one scanner lacks nothing.
+        let is_curable = frame_id == "unknown";
+        assert_eq!(told.could_be, is_curable.then_some("laser"), "{told}");
     }
+}
+
+#[test]
+fn a_further_scanner_that_falls_silent_or_reads_nothing_is_told() {
+    for (last, range, told) in [
+        (40, 2.0, None),
+        (10, 2.0, Some("/scan_rear has scans within 0.25 s of 12 of 40 frames")),
+        (40, f32::NAN, Some("/scan_rear: none of its 40 scans has a range between")),
+        (40, f32::INFINITY, Some("/scan_rear: none of its 40 scans has a range between")),
+    ] {
+        let mut log = LogWriter::plain();
+        log.fixed("base_link", "front", &Isometry3::translation(0.2, 0.0, 0.3));
+        log.fixed("base_link", "rear", &Isometry3::translation(-0.2, 0.0, 0.3));
+        for index in 0..40 {
+            let stamp = at(0.1 * f64::from(index));
+            log.message("/scan", stamp, &sweep(stamp, "front"));
+            if index < last {
+                let ranges = vec![range; 101];
+                log.message("/scan_rear", stamp, &LaserScan { ranges, ..sweep(stamp, "rear") });
+            }
+        }
+        let (mut source, _saved) = open(log, Inputs::NONE.require(Input::Laser));
+        while source.next_frame().is_some() {}
+        let note = source.notes().iter().find(|note| note.starts_with("/scan_rear"));
+        assert_eq!(note.is_some(), told.is_some(), "{:?}", source.notes());
+        assert!(note.is_none_or(|note| note.contains(told.unwrap())), "{note:?}");
+    }
+}
+
+#[test]
+fn a_further_scanner_that_cannot_be_could_be_one() {
+    let mut log = LogWriter::plain();
+    log.fixed("base_link", "front", &Isometry3::translation(0.2, 0.0, 0.3));
+    log.fixed("base_link", "rear", &Isometry3::translation(-0.2, 0.0, 0.3));
+    for index in 0..4 {
+        log.message("/scan", recorded(index), &sweep(recorded(index), "front"));
+        let still = LaserScan { angle_increment: 0.0, ..sweep(recorded(index), "rear") };
+        log.message("/scan_rear", recorded(index), &still);
+    }
+    let saved = log.save();
+    let source = saved.open(&InputSettings::default(), Inputs::ANY).unwrap();
+    let told = entry(&source, "/scan_rear");
+    assert_eq!((told.used_as.as_ref(), told.could_be), (None, Some("laser")), "{told}");
+    // Where the settings name one, the others are left out on purpose.
+    let laser_topic = Some("/scan".to_owned());
+    let named = InputSettings { laser_topic, ..InputSettings::default() };
+    let source = saved.open(&named, Inputs::ANY).unwrap();
+    assert_eq!(entry(&source, "/scan_rear").could_be, None);
 }
 
 #[test]

@@ -334,14 +334,25 @@ fn a_database_without_its_path_is_named() {
 fn a_file_cut_anywhere_is_said_to_be_cut() {
     let stored = Stored::new("");
     let bytes = std::fs::read(&stored.path).unwrap();
+    let mut refused = 0;
     for end in (0..bytes.len()).step_by(512) {
         std::fs::write(&stored.path, &bytes[..end]).unwrap();
-        if let Ok((messages, counters, lost)) = stored.walk() {
-            assert!(lost, "{end}: {counters:?}");
-            // SQLite fills the page of the cut with zeros: what it held cannot be told from them.
-            assert!(messages.len() <= stored.messages.len(), "{end}");
+        match stored.walk() {
+            Ok((messages, counters, lost)) => {
+                assert!(lost, "{end}: {counters:?}");
+                // SQLite fills the page of the cut with zeros: what it held cannot be told from them.
+                assert!(messages.len() <= stored.messages.len(), "{end}");
+            }
+            Err(why) if end > 0 => {
+                refused += 1;
+                let why = why.to_string();
+                let cause = "the database is damaged or cut off: ";
+                assert!(why.contains(cause) && why.contains("copy it again"), "{end}: {why}");
+            }
+            Err(_) => {}
         }
     }
+    assert!(refused > 0, "a part of the first page is no database");
 }
 
 /// Database that its recorder has not finished, copied as it is on the disk: with the file of this

@@ -345,7 +345,7 @@ fn what_is_no_log_is_refused_in_one_line() {
         (&b""[..], "it is empty"),
         (b"#ROSBAG V1.2\n", "ROS 1 bag"),
         (b"#ROSBAG V2.0\n", "no images"),
-        (b"SQLite format 3\0", "rosbag2 database"),
+        (b"SQLite format 3\0", "the database is damaged or cut off"),
         (b"hello, this is text", "starts with"),
         (&MAGIC, "no images"),
         (&[MAGIC, MAGIC].concat(), "no images"),

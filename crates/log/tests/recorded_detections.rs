@@ -53,6 +53,21 @@ fn array(stamp: Stamp, classes: &[&str]) -> Detection2DArray {
 }
 
 #[test]
+fn detections_that_are_slower_than_the_images_are_told() {
+    for (interval, told) in [(1, None), (3, Some("has messages for 7 of 20 images"))] {
+        let mut log = started();
+        for index in (0..20).step_by(interval) {
+            log.message(TOPIC, stamp(index), &array(stamp(index), &["person"]));
+        }
+        let (counts, source) = read(log, 20, &[]);
+        assert_eq!(counts.iter().flatten().count(), 20_usize.div_ceil(interval));
+        let note = source.notes().iter().find(|note| note.contains("has messages for"));
+        assert_eq!(note.is_some(), told.is_some(), "{:?}", source.notes());
+        assert!(note.is_none_or(|note| note.contains(told.unwrap())), "{note:?}");
+    }
+}
+
+#[test]
 fn people_are_taken_and_other_classes_are_named() {
     for (classes, settings, taken) in [
         (&["person", "chair"][..], &[][..], 1),

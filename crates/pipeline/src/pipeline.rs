@@ -41,9 +41,9 @@ impl Pipeline {
     /// [`Frame::odometry_jumped`] the robot stops until [`Pipeline::arm`].
     ///
     /// # Errors
-    /// [`StepError::Lacks`] for a frame without an input that a plugin requires: no plugin sees it, it
-    /// leads to no command, and the next frame is taken as usual. Another [`StepError`] if a plugin
-    /// fails or panics: the pipeline is stopped then, and each further call fails.
+    /// [`StepError::Lacks`] for a frame without an input that a plugin requires: no plugin sees it, the
+    /// last command ends at once, and the next frame is taken as usual. Another [`StepError`] if a
+    /// plugin fails or panics: the pipeline is stopped then, and each further call fails.
     pub fn step(&mut self, frame: impl AsRef<Frame>) -> Result<FrameReport, StepError> {
         self.step_frame(frame.as_ref())
     }
@@ -66,10 +66,17 @@ impl Pipeline {
         let report = self
             .process(restricted.as_ref().unwrap_or(frame))
             .map_err(|error| error.blame_declaration(frame));
-        let is_refused = matches!(report, Err(StepError::Lacks { .. }));
-        if report.is_err() && !is_refused {
-            self.failed = Some(frame.index);
-            self.disarm("a plugin failed");
+        match &report {
+            Ok(_) => {}
+            Err(StepError::Lacks { .. }) => {
+                if let Some(steering) = &mut self.steering {
+                    steering.pass_over(frame);
+                }
+            }
+            Err(_) => {
+                self.failed = Some(frame.index);
+                self.disarm("a plugin failed");
+            }
         }
         report
     }
@@ -154,7 +161,8 @@ impl Pipeline {
 
     /// Tells whether the base executes the commands from now on; not at the start, because a log was
     /// driven by others. Only then can the commands be compared with the odometry: a base that does
-    /// something else (wheels that are stuck, another driver), or responds too late, is a fault.
+    /// something else (wheels that are stuck, another driver), or responds too late, is a fault. A base
+    /// that begins to execute the commands starts from rest, whatever they were before.
     pub fn set_driving(&mut self, is_driving: bool) {
         if let Some(steering) = &mut self.steering {
             steering.set_driving(is_driving);

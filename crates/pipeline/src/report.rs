@@ -66,6 +66,12 @@ impl FrameReport {
         joints_of(&self.candidates)
     }
 
+    /// Returns true if the images show an earlier time, because the camera is frozen: boxes and places
+    /// of people are not those of now.
+    pub fn shows_past(&self) -> bool {
+        matches!(self.cause, Some(Cause::Sensor { shows_past: true, .. }))
+    }
+
     /// Returns an empty report for a frame.
     pub fn new(index: u64, stamp: Stamp) -> Self {
         TrackingReport::new(index, stamp).into()

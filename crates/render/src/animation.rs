@@ -6,8 +6,8 @@ use gif::{DisposalMethod, Encoder, Frame, Repeat};
 use image::imageops::{FilterType, resize};
 use image::{ImageReader, Rgba, RgbaImage};
 
-/// Largest difference of a channel between two pictures that counts as none: what changes by less is
-/// left as it was, which a GIF stores in almost no bytes.
+/// Largest difference of a channel between two pictures that counts as no change: pixels with
+/// smaller changes are left unchanged, which takes almost no bytes in a GIF.
 const SAME: u8 = 10;
 
 /// Speed of the search for colours, 1 (best) to 30.
@@ -26,7 +26,7 @@ impl Animation {
     /// Writes the pictures, in their order.
     ///
     /// # Errors
-    /// A sentence that names the file: a picture that cannot be read, a disk that is full.
+    /// A sentence that names the file, for a picture that cannot be read or a full disk.
     pub fn write<P: AsRef<Path>>(&self, pictures: &[P], to: &Path) -> Result<(), String> {
         let file = BufWriter::new(File::create(to).map_err(|error| cannot_write(to, &error))?);
         let Some(first) = pictures.first() else { return Ok(()) };
@@ -49,7 +49,7 @@ impl Animation {
             }
             let mut frame = Frame::from_rgba_speed(width, height, &mut part, QUANTISING_SPEED);
             frame.delay = u16::try_from(self.delay_ms / 10).unwrap_or(u16::MAX);
-            // Pixels that a later picture leaves transparent stay as they are.
+            // Pixels that are transparent in a later picture do not change.
             frame.dispose = DisposalMethod::Keep;
             encoder.write_frame(&frame).map_err(|error| cannot_write(to, &error))?;
         }
@@ -76,8 +76,8 @@ fn cannot_write(to: &Path, why: &dyn std::fmt::Display) -> String {
     format!("cannot write {}: {why}", to.display())
 }
 
-/// Returns a picture with the pixels left transparent that are shown already, and notes what is
-/// shown then.
+/// Returns a picture in which pixels that are already shown are transparent, and updates the shown
+/// picture.
 fn changed(shown: &mut RgbaImage, picture: RgbaImage) -> RgbaImage {
     let mut part = picture;
     if shown.dimensions() != part.dimensions() {

@@ -5,7 +5,7 @@ use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_wid
 use tagalong_core::RgbImage;
 use tagalong_geometry::Rect;
 
-/// Colour with its opacity.
+/// Colour with opacity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ink {
     /// Red, green, blue.
@@ -20,7 +20,7 @@ impl Ink {
         Self { rgb, opacity: 1.0 }
     }
 
-    /// Returns the same colour, fainter.
+    /// Returns the same colour with less opacity.
     pub const fn faint(self, opacity: f32) -> Self {
         Self { rgb: self.rgb, opacity }
     }
@@ -69,7 +69,7 @@ impl Lettering {
     }
 }
 
-/// Picture to paint on. Everything outside it is cut off.
+/// Picture to paint on. Everything outside of it is clipped.
 pub struct Canvas {
     image: RgbImage,
 }

@@ -15,9 +15,9 @@ pub struct OverlayData {
     pub camera: Arc<Camera>,
     /// Images of the frame; shared, not copied.
     pub images: Images,
-    /// Points of the laser scan in the robot frame, or of a lidar at the height of trunks, m.
+    /// Points of the laser scan in the robot frame, or those of a lidar at the height of trunks, m.
     pub scan: Vec<Point2<f64>>,
-    /// True if a lidar sees people on all sides.
+    /// True if a lidar detects people on all sides.
     pub is_around: bool,
     /// Pose of the robot in the odometry frame.
     pub odom_from_robot: Isometry2<f64>,
@@ -26,6 +26,11 @@ pub struct OverlayData {
 }
 
 impl OverlayData {
+    /// Returns true if boxes and places are those of a frozen image, not of now.
+    pub(crate) fn shows_past(&self) -> bool {
+        self.report.shows_past()
+    }
+
     /// Returns the data of a frame.
     pub fn of(frame: &Frame, odom_from_robot: Isometry2<f64>, report: FrameReport) -> Self {
         let points = frame.scan().map_or(&[][..], |scan| &scan.points);

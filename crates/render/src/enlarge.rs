@@ -1,17 +1,17 @@
 use tagalong_core::RgbImage;
 
-/// Least columns of an image in a picture: smaller ones are enlarged.
+/// Least number of columns of an image in a picture: smaller images are enlarged.
 const LEAST_COLUMNS: usize = 640;
 
-/// Most by which an image is enlarged.
+/// Largest factor of the enlargement.
 const MOST: usize = 16;
 
-/// Returns the whole number by which an image of some columns is enlarged.
+/// Returns the integer factor by which an image with some number of columns is enlarged.
 pub fn factor(columns: usize) -> usize {
     LEAST_COLUMNS.div_ceil(columns.max(1)).clamp(1, MOST)
 }
 
-/// Enlarges an image by a whole number, with linear interpolation.
+/// Enlarges an image by an integer factor, with linear interpolation.
 pub fn enlarge(image: &RgbImage, by: usize) -> RgbImage {
     if by <= 1 || image.width() == 0 || image.height() == 0 {
         return image.clone();
@@ -47,7 +47,7 @@ impl Tap {
     }
 }
 
-/// Returns the source of a target pixel: centres of pixels correspond, borders are repeated.
+/// Returns the source of a target pixel: pixel centres correspond, and borders are repeated.
 fn tap(target: usize, by: usize, length: usize) -> Tap {
     // The centre of the target in parts of 2 * by of a source pixel, moved by one pixel so that it
     // is never negative.

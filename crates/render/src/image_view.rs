@@ -17,7 +17,7 @@ const FAR_M: f32 = 8.0;
 /// Colour of dropped candidates.
 pub const DROPPED: Ink = Ink::solid([215, 215, 215]).faint(0.7);
 
-/// Part of the box of a predicted person that has to be in the image for a label.
+/// Fraction of the box of a predicted person that has to be inside the image for a label.
 const LABELLED: f64 = 0.25;
 
 const TITLE: Ink = Ink::solid([255, 255, 255]);
@@ -39,7 +39,7 @@ pub fn draw(scene: &OverlayData, trails: &Trails, style: OverlayStyle) -> Canvas
     }
     let mut labels = labels(scene, by, style);
     // Tracks come last, so that nothing hides them.
-    let shown = scene.report.visualisation.as_ref();
+    let shown = scene.report.visualisation.as_ref().filter(|_| !scene.shows_past());
     if let Some(sketch) = shown.and_then(|shown| shown.downcast_ref::<Sketch>()) {
         view.draw_silhouettes(sketch);
         if style.is_debug() {
@@ -53,7 +53,12 @@ pub fn draw(scene: &OverlayData, trails: &Trails, style: OverlayStyle) -> Canvas
     // Far to near, so that near people cover far ones.
     for track in style.tracks(scene).rev() {
         let region = view.scaled(&style.region(scene, track));
-        draw_box(&mut view.canvas, &region, track.seen, colour(track));
+        draw_box(
+            &mut view.canvas,
+            &region,
+            track.seen && !scene.shows_past(),
+            colour(scene, track),
+        );
     }
     view.draw_joints(scene, style);
     add_labels(&mut labels, scene, by, style);
@@ -65,7 +70,7 @@ fn scaled(rect: &Rect, by: f64) -> Rect {
     Rect::new(by * rect.x, by * rect.y, by * rect.width, by * rect.height)
 }
 
-/// Returns the place for the labels, which spare the boxes of tracks.
+/// Returns the area of the labels, which avoid the boxes of tracks.
 fn labels(scene: &OverlayData, by: usize, style: OverlayStyle) -> Labels {
     let width = by * scene.camera.width;
     let height = by * scene.camera.height;
@@ -74,8 +79,8 @@ fn labels(scene: &OverlayData, by: usize, style: OverlayStyle) -> Labels {
     Labels::within(Rect::new(0.0, 0.0, width as f64, height as f64), spared)
 }
 
-/// Adds the labels of tracks, near to far, and, to debug, those of dropped candidates where there is
-/// room.
+/// Adds the labels of tracks, nearest first, and, for debugging, those of dropped candidates where
+/// there is room.
 pub fn add_labels(labels: &mut Labels, scene: &OverlayData, by: usize, style: OverlayStyle) {
     let lettering = Lettering::of_width(by * scene.camera.width);
     let area = Rect::new(0.0, 0.0, scene.camera.width as f64, scene.camera.height as f64);
@@ -88,8 +93,8 @@ pub fn add_labels(labels: &mut Labels, scene: &OverlayData, by: usize, style: Ov
             continue;
         }
         let region = scaled(&region, by as f64);
-        let name = name_of(track, scene.report.target == Some(track.id));
-        labels.add(&region, name, lettering, colour(track));
+        let name = name_of(scene, track);
+        labels.add(&region, name, lettering, colour(scene, track));
     }
     for (region, test) in dropped(scene).into_iter().filter(|_| style.is_debug()) {
         labels.add_if_room(&scaled(&region, by as f64), test, Lettering::Small, DROPPED.faint(1.0));
@@ -106,7 +111,7 @@ pub fn placed_labels(scene: &OverlayData, style: OverlayStyle) -> Labels {
 }
 
 /// Renders the box of a track, thick if it is seen and thin if it is only predicted, with a dark
-/// rim that sets it off from bright images.
+/// rim that makes it visible on bright images.
 pub fn draw_box(canvas: &mut Canvas, region: &Rect, seen: bool, ink: Ink) {
     // A person that another sensor sees has no box.
     if region.width <= 0.0 {
@@ -175,7 +180,7 @@ impl ImageView {
         }
     }
 
-    /// Renders one map with its title, above `bottom`; returns its place.
+    /// Renders one map with its title, above `bottom`; returns its area.
     fn draw_map(&mut self, map: &SketchMap, bottom: f64) -> Rect {
         let columns = map.columns.max(1);
         let cell = CELL_PX * self.scale;
@@ -201,7 +206,7 @@ impl ImageView {
             let Some((_, joints)) = joints.iter().find(|(id, _)| *id == track.id) else { continue };
             for [from, to] in joints.bones() {
                 let ends = [self.pixel(&from), self.pixel(&to)];
-                self.canvas.thick_path(&ends, colour(track));
+                self.canvas.thick_path(&ends, colour(scene, track));
             }
         }
     }
@@ -219,7 +224,7 @@ impl ImageView {
             for head in &trail {
                 match scene.camera.project(head) {
                     Some(pixel) => piece.push(self.pixel(&pixel)),
-                    // A line across the part out of view would cut through the picture.
+                    // A line across the part outside of the view would cross the picture.
                     None => self.draw_trail(&mut piece, id),
                 }
             }
@@ -252,11 +257,12 @@ fn dropped(scene: &OverlayData) -> Vec<(Rect, String)> {
     all
 }
 
-/// Returns the number of a track, whether it is the target, its state, and its distance from the robot.
-fn name_of(track: &Track, is_target: bool) -> String {
-    let target = if is_target { " target" } else { "" };
+/// Returns the ID of a track, whether it is the target, its state, and its distance from the robot.
+fn name_of(scene: &OverlayData, track: &Track) -> String {
+    let target = if scene.report.target == Some(track.id) { " target" } else { "" };
     let state = match (track.confirmed, track.seen) {
         (false, _) => "?",
+        _ if scene.shows_past() => " stale",
         (true, true) => "",
         (true, false) => " predicted",
     };

@@ -9,7 +9,7 @@ const GAP_PX: f64 = 1.0;
 /// Distance from its box beyond which a label gets a line to it, pixels.
 const NEAR_PX: f64 = 6.0;
 
-/// Label with its place.
+/// Label with its position.
 #[derive(Clone, Debug)]
 struct Placed {
     bar: Rect,
@@ -19,41 +19,42 @@ struct Placed {
     ink: Ink,
 }
 
-/// Labels of boxes, each inside an area and none over another.
+/// Labels of boxes, all inside an area and without overlap.
 pub struct Labels {
     area: Rect,
-    /// Boxes that labels leave free where they can.
+    /// Boxes that labels avoid if they can.
     spared: Vec<Rect>,
     reserved: Vec<Rect>,
     placed: Vec<Placed>,
 }
 
 impl Labels {
-    /// Returns no label yet; `spared` are boxes that labels cover only if there is no other place.
+    /// Creates an empty set of labels; labels only cover `spared` boxes if there is no other free
+    /// position.
     pub fn within(area: Rect, spared: Vec<Rect>) -> Self {
         Self { area, spared, reserved: Vec::new(), placed: Vec::new() }
     }
 
-    /// Keeps labels away from a place.
+    /// Keeps labels away from an area.
     pub fn reserve(&mut self, place: Rect) {
         self.reserved.push(place);
     }
 
-    /// Adds the label of a box, at the box or as near to it as there is a free place; without any,
-    /// the label is left out.
+    /// Adds the label of a box at the nearest free position; if there is none, the label is left
+    /// out.
     pub fn add(&mut self, of: &Rect, text: String, lettering: Lettering, ink: Ink) {
         let size = lettering.size_px(&text);
         let bar = self.beside(of, size).or_else(|| self.anywhere(of, size));
         self.placed.extend(bar.map(|bar| Placed { bar, of: *of, text, lettering, ink }));
     }
 
-    /// Adds the label of a box if there is a free place at the box.
+    /// Adds the label of a box if there is a free position at the box.
     pub fn add_if_room(&mut self, of: &Rect, text: String, lettering: Lettering, ink: Ink) {
         let bar = self.beside(of, lettering.size_px(&text));
         self.placed.extend(bar.map(|bar| Placed { bar, of: *of, text, lettering, ink }));
     }
 
-    /// Returns a free place at the box: above, below, inside, at its sides.
+    /// Returns a free position at the box: above, below, inside, or at its sides.
     fn beside(&self, of: &Rect, size: [f64; 2]) -> Option<Rect> {
         let mut second_best = None;
         for place in places_at(of, size) {
@@ -69,7 +70,7 @@ impl Labels {
         second_best
     }
 
-    /// Returns the free place nearest to the box, on a grid of lines and half lines.
+    /// Returns the free position nearest to the box, on a grid of half line heights.
     fn anywhere(&self, of: &Rect, [width, height]: [f64; 2]) -> Option<Rect> {
         let columns = steps(self.area.x, self.area.right() - width, 0.5 * height);
         let rows = steps(self.area.y, self.area.bottom() - height, 0.5 * height);
@@ -116,7 +117,7 @@ impl Labels {
     }
 }
 
-/// Returns the places at a box, best first.
+/// Returns the positions at a box, best first.
 fn places_at(of: &Rect, [width, height]: [f64; 2]) -> [Rect; 8] {
     let left = of.x;
     let right = of.right() - width;

@@ -9,8 +9,8 @@ use super::image_view::{DROPPED, draw_box};
 use super::style::{OverlayStyle, TENTATIVE};
 use super::trails::Trails;
 
-/// Returns the height of the strip under image and plan, pixels: the same for all frames, so that
-/// pictures make a video.
+/// Returns the height of the strip under image and plan, pixels. It is the same for all frames, so
+/// that the pictures can be made into a video.
 pub fn height_px(style: OverlayStyle) -> usize {
     if style.is_debug() { 64 } else { 46 }
 }
@@ -19,11 +19,11 @@ const MARGIN_PX: f64 = 6.0;
 const MARK_PX: f64 = 14.0;
 const WHITE: Ink = Ink::solid([235, 235, 235]);
 const QUIET: Ink = Ink::solid([190, 190, 190]);
-/// Colour of the examples, which is that of no track.
+/// Colour of the examples, which no track has.
 const EXAMPLE: Ink = Ink::solid([120, 190, 255]);
 
-/// Renders frame, meaning of the lines, and, to debug, counts of dropped candidates in the strip below
-/// `top`.
+/// Renders the frame number, the legend and, for debugging, counts of dropped candidates in the
+/// strip below `top`.
 pub fn draw(
     canvas: &mut Canvas,
     top: usize,
@@ -64,11 +64,13 @@ fn title(scene: &OverlayData, trails: &Trails, style: OverlayStyle) -> String {
     format!("frame {}   {s}.{ms:03} s   {people}{drive}", scene.report.index)
 }
 
-/// Returns the number of people that are seen; a frame that is not used says so.
+/// Returns the number of visible people in words, or that the frame was not used or is that of a
+/// frozen camera.
 fn seen(scene: &OverlayData) -> String {
     match scene.report.outcome {
         Outcome::OutOfOrder => return "late, not used".to_owned(),
         Outcome::Duplicate => return "repeated, not used".to_owned(),
+        _ if scene.shows_past() => return "frozen image, places are old".to_owned(),
         _ => {}
     }
     match scene.report.tracks.iter().filter(|t| t.confirmed && t.seen).count() {
@@ -77,7 +79,7 @@ fn seen(scene: &OverlayData) -> String {
     }
 }
 
-/// Returns the target, the command and its reason, where the pipeline has a controller.
+/// Returns the target, the command and its reason, if the pipeline has a controller.
 fn drive(report: &FrameReport) -> String {
     let Some(command) = report.command else { return String::new() };
     let target = report.target.map_or("no target".to_owned(), |id| format!("target {id}"));
@@ -170,8 +172,8 @@ fn draw_sample(canvas: &mut Canvas, mark: &Rect, sample: Sample) {
     }
 }
 
-/// Returns the counts of the tests that dropped candidates, largest last test first, as many as fit
-/// into `columns` letters.
+/// Returns the counts of the tests that dropped candidates, latest test first, as many as fit into
+/// `columns` letters.
 fn counts(scene: &OverlayData, columns: usize) -> String {
     let entries = scene.report.funnel.entries();
     if entries.is_empty() {

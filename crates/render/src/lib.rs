@@ -1,10 +1,10 @@
 //! Pictures of the pipeline's detections and tracks, one per frame.
 //!
-//! On the left the camera's image (depth in shades where there is no colour), enlarged to at least
-//! 640 columns, with the people, their ids, distances and trails. On the right the same people from
-//! above, above a legend. [`Detail::Debug`] adds dropped candidates, dashed, with the test that
-//! dropped them, tentative tracks and the state of the filter. All pictures of a run have the same
-//! size.
+//! The left side has the image of the camera (shaded depth if there is no colour), enlarged to at
+//! least 640 columns, with the people, their IDs, distances and trails. The right side has the same
+//! people in a plan view, and below it a legend. [`Detail::Debug`] adds dropped candidates, dashed,
+//! with the test that dropped them, tentative tracks and the state of the filter. All pictures of a
+//! run have the same size.
 //!
 //! ```
 //! use tagalong_render::canvas::{Canvas, Ink};
@@ -51,7 +51,7 @@ pub struct Overlay {
 }
 
 impl Overlay {
-    /// Renders into `folder`, which exists.
+    /// Creates a renderer into an existing `folder`.
     pub fn new(folder: PathBuf, style: OverlayStyle) -> Self {
         Self { folder, style, trails: Trails::default() }
     }
@@ -68,10 +68,11 @@ impl Overlay {
     }
 }
 
-/// Least rows of image and plan: below, the numbers in the plan would not be legible.
+/// Least number of rows of image and plan: with fewer, the numbers in the plan would not be
+/// legible.
 const LEAST_ROWS: usize = 360;
 
-/// Rows of the plan where there is no image: it is as wide as an image then.
+/// Number of rows of the plan if there is no image: the plan is then as wide as an image.
 const ROWS_ALONE: usize = 800;
 
 fn picture(scene: &OverlayData, trails: &Trails, style: OverlayStyle) -> RgbImage {

@@ -8,13 +8,13 @@ use super::labels::Labels;
 use super::style::{LEAST_REACH_M, OverlayStyle, colour, colour_of};
 use super::trails::Trails;
 
-/// Reach of the view behind the robot, as a part of that ahead.
+/// Reach of the view behind the robot, as a fraction of that ahead.
 const BEHIND: f64 = 0.125;
 
-/// Reach of the view ahead of the robot and behind it where people are seen on all sides, m.
+/// Reach of the view ahead of the robot and behind it if people are detected on all sides, m.
 const REACH_AROUND_M: [f64; 2] = [5.0, 4.0];
 
-/// Half the side of the square around a person that labels spare, pixels.
+/// Half the side of the square around a person that labels avoid, pixels.
 const MARK_PX: f64 = 8.0;
 
 /// Colour of the plan behind all marks.
@@ -92,16 +92,16 @@ pub fn draw(scene: &OverlayData, trails: &Trails, style: OverlayStyle, height: u
         canvas.thick_path(&points, colour_of(id).faint(0.7));
     }
     for track in style.tracks(scene).rev() {
-        draw_track(&mut canvas, &plan, track, scene.report.target == Some(track.id));
+        draw_track(&mut canvas, &plan, scene, track);
         if style.is_debug() {
-            draw_uncertainty(&mut canvas, &plan, track);
+            draw_uncertainty(&mut canvas, &plan, track, colour(scene, track));
         }
     }
     labels(scene, &plan, style, height).paint(&mut canvas);
     canvas
 }
 
-/// Returns the IDs of all tracks at their places, which spare the marks of all.
+/// Returns the IDs of all tracks at positions that avoid all marks.
 fn labels(scene: &OverlayData, plan: &Plan, style: OverlayStyle, height: usize) -> Labels {
     let marks = style.tracks(scene).map(|track| plan.mark(track)).collect();
     let mut labels = Labels::within(Rect::new(0.0, 0.0, plan.width, height as f64), marks);
@@ -111,7 +111,7 @@ fn labels(scene: &OverlayData, plan: &Plan, style: OverlayStyle, height: usize) 
     for track in style.tracks(scene).filter(|track| plan.shows(track, height)) {
         let is_target = scene.report.target == Some(track.id);
         let text = if is_target { format!("{} target", track.id) } else { track.id.to_string() };
-        labels.add(&plan.mark(track), text, Lettering::Bold, colour(track));
+        labels.add(&plan.mark(track), text, Lettering::Bold, colour(scene, track));
     }
     labels
 }
@@ -122,7 +122,7 @@ pub fn placed_ids(scene: &OverlayData, style: OverlayStyle, height: usize) -> La
     labels(scene, &Plan::new(height, scene.is_around, style), style, height)
 }
 
-/// Returns the words that explain the view, with their places.
+/// Returns the words that explain the view, with their positions.
 fn notes(plan: &Plan) -> [(Rect, &'static str); 2] {
     let above = "from above";
     let robot = "robot";
@@ -136,7 +136,7 @@ fn notes(plan: &Plan) -> [(Rect, &'static str); 2] {
     ]
 }
 
-/// Renders a line every metre, its number every second one.
+/// Renders a line every metre, and a number at every second line.
 fn draw_grid(canvas: &mut Canvas, plan: &Plan) {
     let [ahead_m, behind_m] = plan.reach_m;
     let sides = (0.5 * plan.width / plan.px_per_m).ceil();
@@ -168,16 +168,21 @@ fn draw_field_of_view(canvas: &mut Canvas, plan: &Plan, scene: &OverlayData) {
     }
 }
 
-fn draw_track(canvas: &mut Canvas, plan: &Plan, track: &Track, target: bool) {
-    let ink = colour(track);
+fn draw_track(canvas: &mut Canvas, plan: &Plan, scene: &OverlayData, track: &Track) {
+    let ink = colour(scene, track);
     let person = &track.estimate.person;
     let at = plan.of(&person.position);
-    let opacity = if track.seen { 1.0 } else { 0.5 };
-    let radius = if target { 7.0 } else { 5.0 };
-    if track.seen {
+    let is_seen = track.seen && !scene.shows_past();
+    let opacity = if is_seen { 1.0 } else { 0.5 };
+    let radius = if scene.report.target == Some(track.id) { 7.0 } else { 5.0 };
+    if is_seen {
         canvas.disc(at, radius, ink);
     } else {
         draw_ring(canvas, at, radius, ink);
+    }
+    // Of an earlier time nothing is known of the next second.
+    if scene.shows_past() {
+        return;
     }
     // The line ends where the person will be in one second.
     let soon = person.position.xy() + person.velocity;
@@ -191,10 +196,10 @@ pub(super) fn draw_ring(canvas: &mut Canvas, at: Point2<f64>, radius: f64, ink: 
 }
 
 /// Renders the ellipse of two standard deviations.
-fn draw_uncertainty(canvas: &mut Canvas, plan: &Plan, track: &Track) {
+fn draw_uncertainty(canvas: &mut Canvas, plan: &Plan, track: &Track, ink: Ink) {
     let person = &track.estimate.person;
     let covariance = track.estimate.covariance.fixed_view::<2, 2>(0, 0).into_owned();
-    canvas.path(&ellipse(plan, &person.position, covariance), colour(track).faint(0.6));
+    canvas.path(&ellipse(plan, &person.position, covariance), ink.faint(0.6));
 }
 
 /// Returns the ellipse of two standard deviations around a position on the floor.

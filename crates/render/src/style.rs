@@ -8,7 +8,7 @@ use super::data::OverlayData;
 /// Content of the pictures of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OverlayStyle {
-    /// Parts that are shown beside people and their trails.
+    /// Amount of detail beside people and their trails.
     pub detail: Detail,
     /// Part of a person that boxes enclose.
     pub boxes: BoxedPart,
@@ -19,16 +19,16 @@ pub struct OverlayStyle {
 /// Least reach of the plan ahead of the robot, m.
 pub(crate) const LEAST_REACH_M: u16 = 8;
 
-/// Largest one, m: beyond, people would be a few pixels apart.
+/// Largest reach of the plan, m: beyond it, people would be only a few pixels apart.
 const MOST_REACH_M: u16 = 30;
 
 /// Parts that a picture shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Detail {
-    /// Confirmed people alone: box, ID, distance, trail, silhouette.
+    /// Only confirmed people: box, ID, distance, trail, silhouette.
     #[default]
     People,
-    /// Dropped candidates with their tests, tentative tracks and the state of the filter, too.
+    /// Also dropped candidates with their tests, tentative tracks and the state of the filter.
     Debug,
 }
 
@@ -38,7 +38,7 @@ impl OverlayStyle {
         Self { detail: Detail::Debug, boxes, ..Self::default() }
     }
 
-    /// Returns the style with a plan that shows people as far away as a pipeline finds them.
+    /// Returns the style with a plan that reaches as far as a pipeline detects people.
     #[must_use]
     pub fn reaching(self, metres: f64) -> Self {
         // Every second line of the plan has a number.
@@ -67,12 +67,12 @@ impl OverlayStyle {
     }
 }
 
-/// Colour of what is not a confirmed track.
+/// Colour of everything that is not a confirmed track.
 pub(crate) const TENTATIVE: Ink = Ink::solid([190, 190, 190]);
 
-/// Returns the colour of a track: grey until it is confirmed.
-pub(crate) fn colour(track: &Track) -> Ink {
-    if track.confirmed { colour_of(track.id) } else { TENTATIVE }
+/// Returns the colour of a track: grey until it is confirmed, and in a frozen image.
+pub(crate) fn colour(scene: &OverlayData, track: &Track) -> Ink {
+    if track.confirmed && !scene.shows_past() { colour_of(track.id) } else { TENTATIVE }
 }
 
 /// Returns the colour of the tracks of an ID.

@@ -4,8 +4,8 @@ use std::sync::Arc;
 use nalgebra::{Isometry2, Point2, Point3, SMatrix, Vector2};
 use tagalong_core::{DepthImage, Detection, Estimate, Images, Person, Stamp, Track, TrackId};
 use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
-use tagalong_log::write::BoxedPart;
-use tagalong_pipeline::{Candidate, Fate, FrameReport};
+use tagalong_log::write::{self, BoxedPart};
+use tagalong_pipeline::{Candidate, Cause, Fate, FrameReport};
 use tagalong_vision::{Silhouette, Sketch, SketchMap, SketchPoint};
 
 use super::canvas::LINE_PX;
@@ -72,6 +72,23 @@ fn a_person_shows_in_the_image_and_from_above() {
     assert!(changed(&empty, &one, 640..1024, 0..480) > 100);
     // Title and counts are in the strip below.
     assert!(changed(&empty, &one, 0..640, 480..544) > 10);
+}
+
+#[test]
+fn in_a_frozen_image_a_person_is_grey_and_stale() {
+    fn coloured(scene: &OverlayData) -> usize {
+        let picture = picture(scene, &Trails::default(), CALM);
+        let colour = write::track_colour(TrackId(1));
+        picture.pixels().iter().filter(|pixel| **pixel == colour).count()
+    }
+
+    let mut scene = scene(&[1], Vec::new());
+    assert!(coloured(&scene) > 100, "{}", coloured(&scene));
+    let name = "the depth image".to_owned();
+    scene.report.cause = Some(Cause::Sensor { name, needs_reset: true, shows_past: true });
+    assert_eq!(coloured(&scene), 0);
+    let labels = image_view::placed_labels(&scene, CALM);
+    assert_eq!(labels.bars()[0].1, "1 stale 3.0 m");
 }
 
 #[test]

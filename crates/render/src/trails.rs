@@ -12,7 +12,7 @@ pub struct Trails {
 }
 
 impl Trails {
-    /// Adds the present positions and forgets tracks that ended.
+    /// Adds the present positions and removes tracks that have ended.
     pub fn follow(&mut self, scene: &OverlayData) {
         let now = scene.report.stamp;
         self.first.get_or_insert(now);
@@ -24,10 +24,13 @@ impl Trails {
         self.first.map_or(0.0, |first| now.seconds_since(first))
     }
 
-    /// Returns the trails of the tracks that are seen now, in the present robot frame, in pieces
-    /// without gaps.
+    /// Returns the trails of the tracks that are seen in the present frame, in the robot frame, in
+    /// pieces without gaps; none in a frozen image.
     pub fn in_robot(&self, scene: &OverlayData) -> Vec<(TrackId, Vec<Point3<f64>>)> {
         let mut pieces = Vec::new();
+        if scene.shows_past() {
+            return pieces;
+        }
         for track in scene.report.tracks.iter().filter(|track| track.seen) {
             for mut piece in self.trails.pieces(track.id) {
                 for place in &mut piece {

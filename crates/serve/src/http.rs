@@ -1,5 +1,5 @@
-//! As much of HTTP/1.1 as a page on this computer needs: requests with bounds on everything, and
-//! an answer per connection.
+//! The subset of HTTP/1.1 that a page on this computer needs: requests with limits on everything,
+//! and one answer per connection.
 
 use serde::Serialize;
 
@@ -9,7 +9,7 @@ const HEAD_BYTES: usize = 16 << 10;
 /// End of the headers.
 const HEAD_END: &[u8] = b"\r\n\r\n";
 
-/// Most header lines.
+/// Largest number of header lines.
 const HEADERS: usize = 100;
 
 /// Request of a browser or a program.
@@ -61,7 +61,7 @@ impl Response {
         }
     }
 
-    /// Returns the refusal of a path that the site does not have.
+    /// Returns the answer for a path that the site does not have.
     pub fn not_found() -> Self {
         Self::refusal(404, "there is no such page")
     }
@@ -71,7 +71,7 @@ impl Response {
         Self { status, kind: "text/plain; charset=utf-8", body: why.into().into_bytes() }
     }
 
-    /// Returns the bytes of the answer, which says that the connection ends.
+    /// Returns the bytes of the answer, whose headers say that the connection is closed.
     pub(crate) fn into_bytes(self, head_only: bool) -> Vec<u8> {
         let Self { status, kind, body } = self;
         let reason = match status {
@@ -117,13 +117,13 @@ pub struct Incoming {
 }
 
 impl Incoming {
-    /// Takes the next bytes, and returns the request once it is whole. Its body has at most
+    /// Adds the next bytes, and returns the request once it is complete. Its body has at most
     /// `body_bytes`.
     ///
     /// # Errors
-    /// The refusal to answer with.
+    /// The answer that refuses the request.
     pub fn take(&mut self, part: &[u8], body_bytes: usize) -> Result<Option<Request>, Response> {
-        // The end of the head may lie across the seam.
+        // The end of the head may be split over two parts.
         let searched = self.bytes.len().saturating_sub(HEAD_END.len() - 1);
         self.bytes.extend_from_slice(part);
         if self.head.is_none() {
@@ -180,7 +180,7 @@ fn parse_head(bytes: &[u8]) -> Result<Request, Response> {
             return Err(wrong("a header has an invalid name or value"));
         }
         let name = name.to_ascii_lowercase();
-        // Two of them could be read in two ways.
+        // Two such headers would be ambiguous.
         let is_single = matches!(name.as_str(), "host" | "content-length" | "origin");
         if is_single && headers.iter().any(|(other, _)| *other == name) {
             return Err(wrong("a header occurs twice"));
@@ -200,7 +200,7 @@ fn body_length(request: &Request, most: usize) -> Result<usize, Response> {
         return Err(Response::refusal(411, "the length of the body is missing"));
     }
     let Some(text) = request.header("content-length") else { return Ok(0) };
-    // `parse` alone would take a plus sign.
+    // `parse` alone would accept a plus sign.
     let is_number = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
     if !is_number {
         return Err(Response::refusal(400, "the length of the body is not a number"));

@@ -1,12 +1,12 @@
-//! A server of pages and answers for this computer, as small as that can be.
+//! A small HTTP server of pages for this computer.
 //!
 //! A [`Site`] turns a [`Request`] into a [`Response`]; [`Server`] does the rest: it listens on the
-//! loopback interface unless told otherwise, checks where a request comes from ([`Access`]), bounds
-//! the length of requests, the time that they take and the number of connections, and ends when it
-//! is told to. A request that is whole has a thread; a site that is slow holds up that request
-//! alone. Clients that are slow to send or to read hold up no other: one thread looks after all of
-//! them, and where there are too many, the one that has waited longest is closed. Where the system
-//! starts no more threads, requests are answered one after the other.
+//! loopback interface by default, checks the origin of requests ([`Access`]), limits the length of
+//! requests, their time and the number of connections, and ends on request. Each complete request
+//! has a thread, so that a slow site only delays that request. Clients that send or read slowly do
+//! not delay others: one thread serves all of them, and if there are too many, the connection that
+//! has waited longest is closed. If the system starts no more threads, requests are answered one
+//! after the other.
 //!
 //! ```
 //! use std::sync::Arc;
@@ -23,10 +23,10 @@
 //!
 //! # Which requests are answered
 //!
-//! Any page that a browser shows may send requests to this computer. So
-//! * the `Host` must be the address of the server: a number, or `localhost`. A foreign name that
-//!   resolves to this computer (DNS rebinding) is refused with 403;
-//! * the `Origin`, where there is one, must be the server itself;
+//! Any page in a browser may send requests to this computer. Therefore
+//! * the `Host` must be the address of the server: a numeric address, or `localhost`. A foreign
+//!   name that resolves to this computer (DNS rebinding) is refused with 403;
+//! * the `Origin`, if there is one, must be the server itself;
 //! * a change (`POST`) is refused with 405 unless [`Access::changes`] allows it, and must then be
 //!   `application/json`, which no form of another page can send;
 //! * with [`Access::key`], the address begins with 128 random bits that are new at each start.

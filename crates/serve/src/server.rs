@@ -9,38 +9,38 @@ use std::time::{Duration, Instant};
 use self::connections::{Connections, Limits, StartThread};
 use crate::http::{Request, Response};
 
-/// Pause between two looks for a connection, for bytes or for a reason to stop.
+/// Pause between two polls for a connection, for bytes or for a reason to stop.
 const PAUSE: Duration = Duration::from_millis(5);
 
-/// Longest wait at the end for answers that are under way.
+/// Longest wait at the end for answers that are still being sent.
 const FAREWELL: Duration = Duration::from_secs(1);
 
-/// Changes that a server takes.
+/// Changes that a server accepts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Changes {
     /// None: every `POST` is refused.
     Refused,
-    /// Those that the server's own page sends: the `Origin` is required.
+    /// Changes that the page of the server itself sends: the `Origin` is required.
     FromPage,
-    /// Those of programs, too, which send no `Origin`.
+    /// Also changes from programs, which send no `Origin`.
     FromPrograms,
 }
 
-/// Place where a server listens, and the requests that it answers.
+/// Address of a server, and the requests that it answers.
 #[derive(Clone, Debug)]
 pub struct Access {
-    /// Interface and port; port 0 takes a free one.
+    /// Interface and port; port 0 selects a free one.
     pub address: SocketAddr,
-    /// True for an address with a random key, which keeps other users of this computer out.
+    /// True for a URL with a random key, which keeps other users of this computer out.
     pub key: bool,
-    /// Changes that it takes.
+    /// Changes that it accepts.
     pub changes: Changes,
     /// Longest body of a request, bytes.
     pub body_bytes: usize,
 }
 
 impl Access {
-    /// Returns the access to a page on this computer: with a key, and without changes.
+    /// Returns the access to a page on this computer, with a key and without changes.
     pub fn loopback(port: u16) -> Self {
         Self::at(SocketAddr::from((Ipv4Addr::LOCALHOST, port)))
     }
@@ -60,9 +60,9 @@ impl Access {
 
 /// Content of a server.
 pub trait Site: Send + Sync + 'static {
-    /// Answers a request that has passed all checks. The path is the one behind the key, without
-    /// the slash at its beginning and with the query. A `HEAD` is answered like a `GET`; the server
-    /// leaves the body out.
+    /// Answers a request that has passed all checks. The path is the part after the key, without
+    /// the leading slash and with the query. A `HEAD` is answered like a `GET`, but the server does
+    /// not send the body.
     fn answer(&self, request: &Request, path: &str) -> Response;
 }
 
@@ -92,8 +92,8 @@ impl Server {
     /// Listens; requests wait until [`Server::serve`] answers them.
     ///
     /// # Errors
-    /// A port that is taken, an interface that this computer does not have, a system without random
-    /// numbers.
+    /// A port that is in use, an interface that this computer does not have, or a system without a
+    /// source of random numbers.
     pub fn open(access: Access) -> io::Result<Self> {
         let listener = TcpListener::bind(access.address)?;
         listener.set_nonblocking(true)?;
@@ -104,8 +104,8 @@ impl Server {
         Ok(Self { listener, guard: Arc::new(guard) })
     }
 
-    /// Returns the address to open, with the key. For a server on all interfaces it is the one that
-    /// this computer itself can open.
+    /// Returns the URL to open, with the key. For a server on all interfaces it is the URL that
+    /// works on this computer.
     pub fn address(&self) -> String {
         let mut at = self.guard.bound;
         if at.ip().is_unspecified() {
@@ -127,8 +127,8 @@ impl Server {
         self.guard.bound
     }
 
-    /// Answers requests until `stop` returns true, which is asked at least 50 times a second; then
-    /// waits up to a second for answers that are under way.
+    /// Answers requests until `stop` returns true, which is called at least 50 times a second; then
+    /// waits up to a second for answers that are still being sent.
     pub fn serve<S: Site>(&self, site: &Arc<S>, stop: impl Fn() -> bool) {
         self.serve_with(site, start_thread, stop);
     }
@@ -164,7 +164,7 @@ impl Guard {
         }
     }
 
-    /// Returns the path behind the key of a request that may be answered.
+    /// Returns the path after the key, if the request may be answered.
     fn admit<'a>(&self, request: &'a Request) -> Result<&'a str, Response> {
         fn refuse(why: &str) -> Result<&str, Response> {
             Err(Response::refusal(403, why))
@@ -176,7 +176,7 @@ impl Guard {
         }
         let is_change = request.method == "POST";
         let needs_origin = is_change && self.changes != Changes::FromPrograms;
-        // Where a browser speaks, the page must be the one of this very address.
+        // If a browser sends the request, its page must have exactly this address.
         let is_foreign = match request.header("origin") {
             Some(origin) => origin.strip_prefix("http://") != Some(host),
             None => needs_origin,
@@ -207,8 +207,8 @@ impl Guard {
         }
     }
 
-    /// Returns true for a name of this server. A page of another name could have a name of its own
-    /// resolve to this computer, but no number.
+    /// Returns true for a name of this server. A foreign page could have its own host name resolve
+    /// to this computer, but it cannot do so for a numeric address.
     fn is_own(&self, host: &str) -> bool {
         let port = self.bound.port();
         if host == format!("localhost:{port}") {
@@ -235,13 +235,13 @@ fn same_host(bound: IpAddr, named: IpAddr) -> bool {
     bound == named || (bound.is_loopback() && named.is_loopback())
 }
 
-/// Compares in a time that does not depend on where two texts differ.
+/// Compares two texts in a time that does not depend on where they differ.
 fn same(a: &str, b: &str) -> bool {
     let differences = a.bytes().zip(b.bytes()).fold(0, |sum, (a, b)| sum | (a ^ b));
     a.len() == b.len() && differences == 0
 }
 
-/// Returns 128 random bits of the system, hexadecimal.
+/// Returns 128 random bits from the system, in hexadecimal.
 fn random_token() -> io::Result<String> {
     let mut bytes = [0; 16];
     getrandom::fill(&mut bytes)

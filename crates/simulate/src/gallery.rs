@@ -13,7 +13,7 @@ use tagalong_vision::Unwrapper;
 
 /// Pictures of one scene.
 const PICTURES: u64 = 6;
-/// Depth that is rendered black, m.
+/// Depth from which pixels are black, m.
 const FAR_M: f32 = 8.0;
 /// Joints that a bone connects.
 const BONES: [[&str; 2]; 12] = [
@@ -31,9 +31,9 @@ const BONES: [[&str; 2]; 12] = [
     ["right_knee", "right_ankle"],
 ];
 
-/// Renders some moments of a scene, evenly spread, with the truth on them: the image on the left,
-/// depth or the right image beside it; of a mirror the unwrapped image and the raw one. Images of
-/// cameras in the room go to a separate picture.
+/// Renders pictures of a scene at evenly spaced times, with the truth: the image on the left, and
+/// beside it depth or the right image, or for a mirror the unwrapped image and the raw one. Images
+/// of cameras in the room are in a separate picture.
 pub fn paint(mut simulation: Simulation, scene: &Scene, folder: &Path) -> Result<(), Failure> {
     make_folder(folder)?;
     let mut unwrapping = Unwrapping::of(&simulation)?;
@@ -49,7 +49,8 @@ pub fn paint(mut simulation: Simulation, scene: &Scene, folder: &Path) -> Result
             }
             Event::Odometry(_) | Event::NoOdometry { .. } | Event::Sensor(_) => continue,
         };
-        // Half an interval in: the pictures then lie in the middle of equal parts of the scene.
+        // Offset by half an interval, so that the pictures are in the middle of equal parts of the
+        // scene.
         if shot.captured_ns < drawn * every_ns + every_ns / 2 {
             continue;
         }
@@ -76,7 +77,7 @@ struct Unwrapping {
 }
 
 impl Unwrapping {
-    /// Returns `None` for a camera without a mirror.
+    /// Creates the converter; `None` for a camera without a mirror.
     fn of(simulation: &Simulation) -> Result<Option<Self>, Failure> {
         let Some(panorama) = simulation.panorama() else { return Ok(None) };
         let camera = simulation.camera();
@@ -128,7 +129,7 @@ fn annotated(image: &RgbImage, truth: &[Truth]) -> RgbImage {
     canvas.into_image()
 }
 
-/// Draws the bones between joints in the image: those in sight bright, the others faint.
+/// Renders the bones between joints in the image: visible ones bright, the others faint.
 fn skeleton(canvas: &mut Canvas, joints: &[Joint]) {
     for [from, to] in BONES {
         let from = joints.iter().find(|joint| joint.name == from);
@@ -144,7 +145,8 @@ fn skeleton(canvas: &mut Canvas, joints: &[Joint]) {
     }
 }
 
-/// Outlines a rectangle. Beyond the right edge of a panorama it goes on at the left.
+/// Renders the outline of a rectangle. Beyond the right edge of a panorama it continues at the
+/// left.
 fn outline(canvas: &mut Canvas, rect: &Rect, width: f64, ink: Ink) {
     canvas.outline(rect, 1, ink);
     if rect.right() > width {

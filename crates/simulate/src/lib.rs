@@ -69,8 +69,8 @@ pub struct SimulateArgs {
 /// Simulates the scene.
 ///
 /// # Errors
-/// A scene that cannot be read or is wrong, and an output path that cannot be written, are exit
-/// code 2; a disk that fails is 1.
+/// Exit code 2 for a scene that cannot be read or is wrong, and for an output path that cannot be
+/// written; 1 for a failure of the disk.
 pub fn simulate(args: &SimulateArgs) -> Outcome {
     let path = &args.scene;
     let variant = Variant { seed: args.seed, split: args.split, set: args.set.clone() };
@@ -146,7 +146,8 @@ fn default_log(scene: &Path) -> PathBuf {
     Path::new("runs").join(scene.file_stem().unwrap_or_default()).with_extension("mcap")
 }
 
-/// Writes everything that the robot records, as long as it `goes_on`; returns the number of images.
+/// Writes everything that the robot records, while `goes_on` returns true; returns the number of
+/// images.
 ///
 /// # Errors
 /// [`WriteError`] if the file cannot be written.
@@ -184,7 +185,8 @@ pub fn record(
     })
 }
 
-/// Events that may wait to be written: a few images, so that neither side waits long for the other.
+/// Largest number of events that wait to be written: a few images, so that neither side waits long
+/// for the other.
 const EVENTS_AHEAD: usize = 16;
 
 #[cfg(test)]

@@ -41,7 +41,7 @@ const TRUE_WEBCAMS_TOPIC: &str = "/truth/tf_static";
 /// Frame of the room's coordinates.
 const WORLD_FRAME: &str = "world";
 
-/// Writer of the robot's recordings, under the topics that robots use.
+/// Writer of the recordings of a simulated robot, with the topics that robots use.
 pub struct Recorder {
     log: MessageLog,
     camera: Camera,
@@ -106,7 +106,7 @@ impl Recorder {
         }
     }
 
-    /// Writes a pipeline's report of an image, with the command, by the capture time since the
+    /// Writes the report of a pipeline on an image, with the command, at the capture time since the
     /// start.
     ///
     /// # Errors
@@ -153,7 +153,7 @@ impl Recorder {
             self.colour("/camera/color", recorded, &header, colour)?;
         }
         if let Some(depth) = &images.depth {
-            // Depth has a capture time of its own, and cannot be recorded before it.
+            // Depth has its own capture time, and cannot be recorded before it.
             let offset_ns = shot.depth_ns.saturating_sub(shot.stamp_ns);
             let recorded = recorded.max(log_stamp(shot.captured_ns + offset_ns));
             let header = Header::new(log_stamp(shot.depth_ns), CAMERA_FRAME);
@@ -170,7 +170,7 @@ impl Recorder {
         self.log.send_truth(recorded, &truth(captured, &shot.truth))
     }
 
-    /// Writes a reading of a further sensor of obstacles under the topic of its kind and name.
+    /// Writes a reading of a further obstacle sensor, on the topic of its kind and name.
     fn sensor(&mut self, reading: &SensorReading) -> Result<(), WriteError> {
         let name: &str = &reading.name;
         let at = log_stamp(reading.at_ns);
@@ -190,7 +190,7 @@ impl Recorder {
         }
     }
 
-    /// Takes the camera of the next images; a mount that has moved is told once.
+    /// Sets the camera of the next images; the transform of a mount that has moved is written once.
     fn describe(&mut self, at: Stamp, camera: &Arc<Camera>) -> Result<(), WriteError> {
         let pose = camera.robot_from_camera;
         if pose != self.camera.robot_from_camera {
@@ -298,9 +298,9 @@ fn jpeg(image: &RgbImage) -> Vec<u8> {
     out
 }
 
-/// Converts to millimetres, rounded and at most what 16 bits hold; 0 is "no reading", as in REP 118.
-/// Rounding by a function, or a cast that checks its range, would keep the loop over an image from
-/// becoming vector instructions.
+/// Converts to millimetres, rounded and at most what 16 bits hold; 0 is "no reading", as in REP
+/// 118. A call of a rounding function, or a cast that checks its range, would prevent the compiler
+/// from vectorising the loop over an image.
 #[inline]
 fn millimetres(depth_m: f32) -> u16 {
     // From this power of two on, the last bits of the float are the integer itself.

@@ -1,5 +1,5 @@
 //! The built-in log: two simulated people walk past each other in front of a slowly moving robot.
-//! It is used where the user gives no log.
+//! It is used if the user gives no log.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! Scenes that need no file, so that commands work outside of a clone.
+//! Built-in scenes, so that commands work outside of a clone.
 
 use std::path::{Path, PathBuf};
 
@@ -25,11 +25,11 @@ const BUILT_IN: &[(&str, &str)] = scenes! {
     "turntable"
 };
 
-/// Folder that the names stand for.
+/// Folder of the named scenes.
 const FOLDER: &str = "configs/scenes";
 
-/// Returns the text of the built-in scene that a path names: by its name alone, or as the file that
-/// it is in a clone.
+/// Returns the text of the built-in scene that a path names, either by its bare name or by the path
+/// of its file in a clone.
 pub fn built_in(path: &Path) -> Option<&'static str> {
     let shown = path.to_str()?;
     let file = shown.strip_prefix(FOLDER).and_then(|rest| rest.strip_prefix('/'));

@@ -1,5 +1,5 @@
-//! Census transform: each pixel becomes a bit string of its darker neighbours. Two views of one
-//! point get nearly the same string, whatever their exposure and gain.
+//! Census transform: each pixel is described by a bit string that marks its darker neighbours. Two
+//! views of the same point get nearly the same string, whatever their exposure and gain.
 //!
 //! R. Zabih and J. Woodfill, *Non-parametric local transforms for computing
 //! visual correspondence*, ECCV 1994, section 3.
@@ -28,7 +28,7 @@ const fn neighbours() -> [(i32, i32); 8 * BYTES] {
     all
 }
 
-/// Bit strings of one row, in one plane per byte.
+/// Bit strings of one row, stored as one plane per byte.
 #[derive(Clone, Debug, Default)]
 pub struct CensusRow {
     /// Planes by byte of the string: one value per column, followed by the padding of a mirrored
@@ -38,8 +38,8 @@ pub struct CensusRow {
 
 impl CensusRow {
     /// Computes a row. A neighbour counts as darker only if the difference is more than `noise`. A
-    /// mirrored row is written from right to left, and the value of the first column is repeated
-    /// `mirrored` times behind it.
+    /// mirrored row is written from right to left, and followed by `mirrored` copies of the value
+    /// of the first column.
     pub fn compute(&mut self, rows: &Rows, noise: u8, mirrored: Option<usize>) {
         let width = rows.width();
         for (byte, plane) in self.planes.iter_mut().enumerate() {

@@ -6,7 +6,7 @@ use crate::census::{BYTES, CensusRow};
 use crate::level::Level;
 use crate::rows::Rows;
 
-/// Quantities of an image row that are compared.
+/// Quantities of an image row that the costs compare.
 #[derive(Clone, Debug, Default)]
 pub struct Features {
     rows: Rows,
@@ -58,8 +58,8 @@ pub fn bits<const D: usize>(
     }
 }
 
-/// Upper limit of the difference in brightness; beyond, the pixels show different points, however
-/// large the difference.
+/// Upper limit of the difference in brightness; above it the pixels show different points, however
+/// large the difference is.
 pub const MOST_BRIGHTNESS: u8 = 32;
 /// Upper limit of the difference in slope, and its weight.
 pub const MOST_SLOPE: u8 = 8;

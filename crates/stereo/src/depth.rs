@@ -13,9 +13,9 @@ use crate::{Disparities, Dropped, Matcher, StereoSettings};
 /// Number of frames between two checks of the rectification.
 const CHECK_EVERY: u64 = 30;
 
-/// Brightness up to which an image is black.
+/// Mean brightness up to which an image counts as black.
 const BLACK: u8 = 8;
-/// Brightness from which on a pixel is saturated.
+/// Brightness from which a pixel counts as saturated.
 const SATURATED: u8 = 250;
 /// Maximum fraction of saturated pixels.
 const MAX_SATURATED: f64 = 0.9;
@@ -37,7 +37,7 @@ pub struct StereoDepth {
 }
 
 impl StereoDepth {
-    /// Depth by these settings.
+    /// Creates the computation with these settings.
     ///
     /// # Errors
     /// As [`StereoSettings::check`].
@@ -54,13 +54,13 @@ impl StereoDepth {
     }
 
     /// Returns the depth of a frame's left image, of the same size: metres along the optical axis,
-    /// NaN = unknown. The reasons for unknown pixels, or for an image without any depth, are
-    /// counted in the funnel, and so are frames in which the least depth has a larger disparity than
-    /// is searched, 255 px: nearer points are then unknown.
+    /// NaN = unknown. The funnel counts the reasons for unknown pixels, or for an image without any
+    /// depth. It also counts frames in which the least depth has a disparity above the largest one
+    /// that is searched, 255 px: nearer points are then unknown.
     ///
     /// # Errors
     /// [`Error::MissingImage`] without a right or a left image; [`Error::Other`] if they differ in
-    /// size, the camera is no pinhole, or its focal length or the baseline is not positive.
+    /// size, the camera is not a pinhole, or its focal length or the baseline is not positive.
     pub fn depth(&mut self, frame: &Frame, funnel: &mut Funnel) -> Result<Arc<DepthImage>> {
         let right = frame.right()?;
         let left = frame.grey()?;
@@ -212,8 +212,8 @@ fn count(dropped: &Dropped, funnel: &mut Funnel) {
     funnel.drop_many("stereo pixels: speckle", dropped.speckle);
 }
 
-/// Writes the depths at full size, each to the pixels that were reduced to its own; returns the
-/// number that were out of range.
+/// Writes the depths at full size, each to all pixels that its reduced pixel covers; returns the
+/// number of depths out of range.
 fn write(
     disparities: &Disparities<'_>,
     focal_baseline: f32,
@@ -247,7 +247,7 @@ fn to_depth(row: &mut [f32], focal_baseline: f32, range: &RangeInclusive<f32>) -
     for depth in row {
         let metres = focal_baseline / *depth;
         let inside = (metres >= nearest) & (metres <= farthest);
-        // A sum with an overflow check is no vector instruction.
+        // A sum with an overflow check cannot be vectorised.
         out = out.wrapping_add(u32::from(!inside & !metres.is_nan()));
         *depth = if inside { metres } else { f32::NAN };
     }

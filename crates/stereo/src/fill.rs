@@ -1,13 +1,13 @@
-//! Closes small holes of a surface.
+//! Filling of small holes in a surface.
 
 /// Maximum size of holes that are filled.
 #[derive(Clone, Copy, Debug)]
 pub struct Most {
-    /// Pixels along a row ...
+    /// Length along a row, pixels ...
     pub px: usize,
-    /// ... or baselines, whichever is more: an object at disparity `d` has `d` pixels per baseline.
+    /// ... or in baselines, whichever is longer: at disparity `d` a baseline is `d` pixels long.
     pub baselines: f32,
-    /// Difference of disparity between the ends, px.
+    /// Difference between the disparities at the ends, px.
     pub step: f32,
 }
 

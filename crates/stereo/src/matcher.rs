@@ -9,11 +9,11 @@ use crate::strip::{Output, Pair, Strip};
 use crate::texture::TextureTest;
 use crate::{Dropped, Method, StereoSettings, fill};
 
-/// Rows of a strip of semi-global matching, where paths start above each strip. It does not depend
-/// on the number of threads, so that the disparities do not, either.
+/// Number of rows of a strip in semi-global matching, whose paths start above each strip. It does
+/// not depend on the number of threads, so that the disparities do not, either.
 const STRIP_ROWS: usize = 192;
 
-/// Matcher of rectified pairs; keeps its buffers between them.
+/// Matcher of rectified pairs; keeps its buffers between calls.
 #[derive(Debug)]
 pub struct Matcher {
     settings: StereoSettings,
@@ -34,16 +34,16 @@ pub struct Disparities<'a> {
     pub width: usize,
     /// Shift of each pixel to the left in the right image, px; NaN = unknown.
     pub values: &'a [f32],
-    /// Confidence of each disparity, 0 to 255: the relative distance of the second best cost from
-    /// the best.
+    /// Confidence of each disparity, 0 to 255: the relative difference between the second best cost
+    /// and the best.
     pub confidences: &'a [u8],
     /// Number of pixels without a disparity, by reason.
     pub dropped: Dropped,
 }
 
 impl Matcher {
-    /// A matcher. Of the settings, those that speak of metres and of the width
-    /// are not its concern: see [`crate::StereoDepth`].
+    /// Creates a matcher. It ignores the settings in metres and the width, which
+    /// [`crate::StereoDepth`] uses.
     ///
     /// # Errors
     /// As [`StereoSettings::check`].
@@ -120,7 +120,7 @@ impl Matcher {
     }
 
     fn fill(&mut self, left: &GreyImage, right: &GreyImage, max_disparity: usize) -> Result<()> {
-        // One instance per power of two: loops of fixed length become vector instructions.
+        // One instance per power of two, because loops of fixed length are vectorised.
         let run = match max_disparity {
             0..16 => Self::run::<16>,
             16..32 => Self::run::<32>,
@@ -178,8 +178,8 @@ pub(crate) fn size_error(left: &GreyImage, right: &GreyImage) -> Option<Error> {
     })
 }
 
-/// Computes the penalties. The large one falls with the difference in brightness: a jump of the
-/// disparity is likely where the image has an edge (equation 14 of the paper).
+/// Computes the penalties. The large one decreases with the difference in brightness, because a
+/// jump of the disparity is likely at an edge of the image (equation 14 of the paper).
 fn penalties(settings: &StereoSettings) -> Penalties {
     let StereoSettings { small_penalty, large_penalty, edge_penalty, .. } = *settings;
     Penalties {

@@ -7,11 +7,11 @@
 //! the right and the row above (three directions), so that one pass over the
 //! rows is enough and no cost volume is kept.
 //!
-//! All numbers are bytes. The minimum that equation 13 subtracts to keep them small is subtracted
+//! All values are bytes. The minimum that equation 13 subtracts to keep them small is subtracted
 //! when a value is stored, so that a stored value is the excess over the best disparity of that
 //! pixel.
 
-/// Bytes between the pixels of a row, for disparities outside of the range.
+/// Padding between the pixels of a row for disparities outside of the range, bytes.
 const GAP: usize = 16;
 
 /// Penalties for a change of the disparity along a path.

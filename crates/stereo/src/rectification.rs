@@ -1,7 +1,7 @@
 //! Checks that a pair is rectified and not swapped.
 //!
-//! A matcher searches along rows and to one side only, so that it cannot detect either. Some
-//! distinct points of the left image are therefore searched for in all directions.
+//! A matcher only searches along rows and to one side, so that it cannot detect either mistake.
+//! Therefore some distinct points of the left image are searched for in all directions.
 
 use tagalong_core::GreyImage;
 
@@ -109,7 +109,7 @@ fn find(left: &GreyImage, right: &GreyImage, (x, y): (usize, usize), reach: i32)
         .map(|(shift, down)| (cost_of_shift(pair, (x, y), shift, down), shift, down))
         .collect();
     let best = *all.iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
-    // Matches beside the best one are part of the same minimum and no rivals.
+    // Matches beside the best one belong to the same minimum and are not rivals.
     let rival = all
         .iter()
         .filter(|c| (c.1 - best.1).abs() > 2 || (c.2 - best.2).abs() > 2)
@@ -125,7 +125,7 @@ fn find(left: &GreyImage, right: &GreyImage, (x, y): (usize, usize), reach: i32)
     })
 }
 
-/// Returns the difference of the images where the right one is shifted by so many pixels.
+/// Returns the difference between the images if the right one is shifted by a number of pixels.
 fn cost_of_shift(
     [left, right]: [&GreyImage; 2],
     (x, y): (usize, usize),

@@ -1,8 +1,8 @@
-//! Reduction of images by the mean over the area of each new pixel.
+//! Downscaling of images by the mean over the area of each new pixel.
 
 use tagalong_core::GreyImage;
 
-/// Reduces images to one size; keeps its buffers.
+/// Downscales images to one size; keeps its buffers between calls.
 #[derive(Debug, Default)]
 pub struct Reducer {
     row: Vec<f32>,
@@ -33,8 +33,8 @@ impl Reducer {
     }
 }
 
-/// Yields the cells that cell `at` of `to` covers when there are `from` of them, each with its
-/// share.
+/// Yields the source cells, of `from` in all, that the target cell `at` of `to` covers, each with
+/// its share.
 fn shares(at: usize, to: usize, from: usize) -> impl Iterator<Item = (usize, f32)> {
     let size = from as f32 / to as f32;
     let begin = at as f32 * size;

@@ -1,6 +1,6 @@
 //! Sub-pixel disparities from the images themselves, by least squares over a window on the same
-//! surface. The sums of matching costs are bytes, and the parabola through three of them follows
-//! the noise of the images.
+//! surface. This is needed because the sums of matching costs are bytes, and the parabola through
+//! three of them follows the noise of the images.
 //!
 //! B. Lucas and T. Kanade, *An iterative image registration technique with an application to stereo
 //! vision*, IJCAI 1981, section 4, one step, along the row. The right camera may be more sensitive,
@@ -9,9 +9,9 @@
 //! window would blur the step between a person and the wall behind, which is less than a pixel
 //! beyond 4 m.
 //!
-//! The outline of a round object lies behind its front, by the radius of a head for a head, and has
-//! the strongest slopes. They count less than their square, so that the disparity of a face is that
-//! of its faint features.
+//! The outline of a round object lies behind its front (for a head, by the radius of the head), and
+//! has the strongest slopes. Slopes count less than their square, so that the disparity of a face
+//! is determined by its faint features.
 
 use tagalong_core::GreyImage;
 
@@ -22,7 +22,7 @@ const SAME_PX: f32 = 1.0;
 /// Weight of the previous disparity: the variance of the noise of a pixel, in grey levels, over
 /// that of the disparity, in pixels.
 const PRIOR: f32 = 20.0;
-/// Slope beyond which the weight hardly grows, grey levels.
+/// Slope above which the weight hardly grows, grey levels.
 const STRONG: f32 = 6.0;
 /// Variance added to that of each row, so that noise does not decide the gain of a row without
 /// contrast.
@@ -35,7 +35,7 @@ const MOST_PX: f32 = 0.5;
 pub const MAX_RADIUS: usize = 16;
 /// Number of pixels that are processed at once.
 const LANES: usize = 16;
-/// Value of an unknown disparity where numbers must be finite.
+/// Substitute for an unknown disparity where values must be finite.
 const UNKNOWN: f32 = 1e6;
 
 /// Refines disparities; keeps its buffers.
@@ -70,8 +70,8 @@ fn lanes(row: &[f32], from: usize) -> &[f32; LANES] {
     &row[from..].as_chunks().0[0]
 }
 
-/// Returns 1 if two disparities are of one surface, otherwise 0; an unknown one differs from any
-/// known one.
+/// Returns 1 if two disparities belong to the same surface, otherwise 0; an unknown one differs
+/// from any known one.
 #[inline(always)]
 fn same(a: f32, b: f32) -> f32 {
     if (a - b).abs() <= SAME_PX { 1.0 } else { 0.0 }
@@ -148,8 +148,8 @@ fn levels(row: &[u8], padded: &mut Vec<u8>, levels: &mut Vec<[f32; 2]>) {
     levels[width] = levels[width - 1];
 }
 
-/// Linear equations of the pixels of a row for their disparity `d`: `g d = q`, in grey levels,
-/// reduced for strong slopes. There is padding for a window on both sides.
+/// Linear equations of the pixels of a row for their disparity `d`: `g d = q`, in grey levels, with
+/// reduced weight for strong slopes. Both sides are padded for a window.
 #[derive(Debug, Default)]
 struct Equations {
     d: Vec<f32>,
@@ -183,8 +183,8 @@ impl Equations {
 const WHOLE: f32 = 8_388_608.0;
 const LAST_BITS: u32 = WHOLE as u32 - 1;
 
-/// Interpolates brightness and slope of the right image at the matches of the left pixels; its
-/// border is continued.
+/// Interpolates brightness and slope of the right image at the matches of the left pixels; outside
+/// of the image, its border is continued.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn between(
     right: &[[f32; 2]],
@@ -199,7 +199,8 @@ fn between(
     let slope = &mut slope[..width];
     let level = &mut level[..width];
     let last = (width - 1) as f32;
-    // The columns first, without access to the images: this loop becomes vector instructions.
+    // The columns are computed first, without access to the images, so that this loop is
+    // vectorised.
     for x in 0..width {
         let at = (x as i32 as f32 - disparities[x]).clamp(0.0, last);
         columns[x] = (at.floor() + WHOLE).to_bits() & LAST_BITS;

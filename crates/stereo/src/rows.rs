@@ -1,4 +1,4 @@
-//! Some rows of an image at a time, with its border continued outside of it.
+//! Access to some rows of an image at a time, with its border continued outside.
 
 use tagalong_core::GreyImage;
 
@@ -43,7 +43,7 @@ fn pad(row: &[u8], padded: &mut Vec<u8>) {
     padded.resize(row.len() + 2 * REACH, row[row.len() - 1]);
 }
 
-/// Reverses a row if `mirrored` is given, and repeats its last value so many times behind it.
+/// Reverses a row if `mirrored` is given, and appends that many copies of its last value.
 pub fn mirror(row: &mut Vec<u8>, mirrored: Option<usize>) {
     let Some(room) = mirrored else { return };
     row.reverse();

@@ -8,9 +8,9 @@ use tagalong_core::{Error, Result, settings};
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Method {
-    /// Best match of a window: fast; holes where there is no texture.
+    /// Best match of a window: fast, with holes where there is no texture.
     Block,
-    /// Costs summed up along paths: smoother, with fewer holes.
+    /// Costs that are summed up along paths: smoother, with fewer holes.
     #[default]
     SemiGlobal,
 }
@@ -20,11 +20,11 @@ settings! {
     pub struct StereoSettings {
         /// Matching method: `block` (fast) or `semi-global` (smooth, fewer holes).
         pub method: Method = Method::SemiGlobal,
-        /// Maximum width at which pairs are matched, px; wider ones are reduced to it, and their
-        /// depth is enlarged to their size.
+        /// Maximum width at which pairs are matched, px; wider images are downscaled to it, and
+        /// their depth is enlarged to the original size.
         #[schemars(range(min = 16, max = 8192))]
         pub width: usize = 512,
-        /// Minimum depth, m. Half of it is twice the work.
+        /// Minimum depth, m. Half the value takes twice the work.
         #[schemars(extend("exclusiveMinimum" = 0))]
         pub min_depth_m: f64 = 0.5,
         /// Maximum depth, m.
@@ -32,47 +32,47 @@ settings! {
         /// Maximum disparity, px at the reduced width; 0 derives it from `min_depth_m`.
         #[schemars(range(max = 255))]
         pub max_disparity: usize = 0,
-        /// Difference in brightness up to which it is taken for noise, of 255.
+        /// Difference in brightness up to which two pixels count as equal, of 255.
         pub noise: u8 = 3,
-        /// Minimum distance of the second best match from the best, as a fraction of its cost, 0 to
-        /// 1.
+        /// Minimum difference between the costs of the second best match and the best, as a
+        /// fraction of the former, 0 to 1.
         #[schemars(range(min = 0.0), extend("exclusiveMaximum" = 1))]
         pub uniqueness: f64 = 0.05,
         /// Maximum difference between the disparities of a point in the left and in the right
         /// image, px at the reduced width.
         pub left_right: u8 = 1,
         /// Minimum change of brightness across a textured pixel (half of Sobel's sum: twice the
-        /// height of a step). Other pixels keep their disparity only if it is that of their
+        /// height of a step). Other pixels only keep their disparity if it equals that of their
         /// textured neighbours in the row; 0 keeps them all.
         pub texture: u8 = 12,
-        /// Minimum size of a patch, pixels; smaller ones are taken for errors.
+        /// Minimum size of a patch, pixels; smaller ones are dropped.
         pub speckle_pixels: usize = 100,
         /// Maximum difference between neighbouring disparities of one patch, px.
         #[schemars(range(min = 0.0))]
         pub speckle_step: f64 = 2.0,
-        /// Maximum length of holes along a row that are filled, px at the reduced width, if their
-        /// ends are of one patch; 0 leaves them open.
+        /// Maximum length along a row of holes that are filled, px at the reduced width, if both
+        /// ends belong to the same patch; 0 fills none.
         pub fill_px: usize = 8,
-        /// Maximum length of such holes in baselines, if that is longer.
+        /// The same in baselines, if that is longer.
         #[schemars(range(min = 0.0))]
         pub fill_baselines: f64 = 1.0,
         /// Half the side of the window over which disparities are refined from the brightness
-        /// itself, px at the reduced width; 0 leaves them.
+        /// itself, px at the reduced width; 0: no refinement.
         #[schemars(range(max = 16))]
         pub refine_px: usize = 2,
         /// Block: side of the window, px; odd, at most 9.
         pub window: usize = 9,
         /// Semi-global: penalty of a disparity that changes by one.
         pub small_penalty: u8 = 6,
-        /// Semi-global: penalty of a greater change where the image is smooth ...
+        /// Semi-global: penalty of a larger change where the image is smooth.
         #[schemars(range(max = 200))]
         pub large_penalty: u8 = 40,
-        /// ... and where it has a strong edge.
+        /// Semi-global: penalty of a larger change where the image has a strong edge.
         pub edge_penalty: u8 = 15,
         /// Vertical offset of the images above which a warning is given, px.
         #[schemars(extend("exclusiveMinimum" = 0))]
         pub max_vertical_px: f64 = 1.0,
-        /// Number of threads; 0 takes one for each core. The result does not depend on it.
+        /// Number of threads; 0: one per core. The result does not depend on it.
         #[schemars(range(max = 64))]
         pub threads: usize = 0,
     }
@@ -82,14 +82,14 @@ settings! {
 pub const MAX_DISPARITIES: usize = 256;
 
 impl StereoSettings {
-    /// Returns the settings for at most so many threads, 1 at least.
+    /// Returns the settings with at most this number of threads, but at least 1.
     #[must_use]
     pub fn on_threads(&self, most: usize) -> Self {
         let own = if self.threads == 0 { most } else { self.threads };
         Self { threads: own.min(most).max(1), ..self.clone() }
     }
 
-    /// Refuses settings that cannot work.
+    /// Refuses invalid settings.
     ///
     /// # Errors
     /// [`tagalong_core::Error::Settings`] names the key.

@@ -1,4 +1,4 @@
-//! Work of several threads.
+//! Distribution of work over several threads.
 
 use std::sync::{Mutex, PoisonError};
 use std::thread;
@@ -9,8 +9,8 @@ pub fn band_rows(height: usize, threads: usize) -> usize {
     height.div_ceil(threads).max(1)
 }
 
-/// Does all jobs at once, each on its own thread, one on this. Where the system starts no more threads,
-/// those that run do the jobs of the others.
+/// Runs all jobs at once, each on its own thread, and one on this thread. If the system starts no
+/// more threads, those that run do the remaining jobs.
 pub fn share<J: Send>(jobs: impl IntoIterator<Item = J>, work: impl Fn(J) + Sync) {
     let jobs: Vec<J> = jobs.into_iter().collect();
     let count = jobs.len();
@@ -23,14 +23,14 @@ pub fn share<J: Send>(jobs: impl IntoIterator<Item = J>, work: impl Fn(J) + Sync
     });
 }
 
-/// Does jobs until none is left.
+/// Runs jobs until none is left.
 fn do_jobs<J>(queue: &Mutex<IntoIter<J>>, work: &impl Fn(J)) {
     while let Some(job) = next(queue) {
         work(job);
     }
 }
 
-/// Takes the next job; the lock is held no longer than that.
+/// Takes the next job; the lock is only held meanwhile.
 fn next<J>(queue: &Mutex<impl Iterator<Item = J>>) -> Option<J> {
     queue.lock().unwrap_or_else(PoisonError::into_inner).next()
 }

@@ -1,12 +1,12 @@
 //! Removal of small patches of disparities that do not fit their surroundings.
 
-/// Finds patches by runs: a run is a stretch of a row without a jump; runs of neighbouring rows
-/// that touch without a jump are of one patch.
+/// Finds patches from runs: a run is a part of a row without a jump, and runs of adjacent rows that
+/// touch without a jump belong to the same patch.
 #[derive(Debug, Default)]
 pub struct SpeckleFilter {
     /// First and one past last column of each run, row by row.
     runs: Vec<(u32, u32)>,
-    /// Run that each run is joined to; itself for a root.
+    /// Parent of each run; a root is its own parent.
     joined: Vec<u32>,
     /// Number of pixels of the patch, at its root.
     pixels: Vec<u32>,

@@ -28,7 +28,7 @@ pub struct Strip {
     pub dropped: Dropped,
 }
 
-/// Inputs that all strips of a pair share.
+/// Inputs that all strips of a pair have in common.
 pub struct Pair<'a> {
     pub left: &'a GreyImage,
     pub right: &'a GreyImage,

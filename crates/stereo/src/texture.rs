@@ -1,17 +1,18 @@
 //! Removal of disparities without support from texture.
 //!
 //! Where an image is smooth, costs carry no information, and paths extend the disparity of a
-//! person's outline far into a bare wall. An outline belongs to the nearer surface. So a smooth
-//! pixel keeps its disparity only if it is that of its textured neighbours in the row, or of the
-//! farther one of them: the inside of a person is bounded by the person on both sides, the wall
-//! beside is not. Disparities that are too small are dropped like those that are too large: noise
-//! that is cut on one side only would leave all surfaces too far.
+//! person's outline far into a bare wall. An outline belongs to the nearer surface. Therefore a
+//! smooth pixel only keeps its disparity if it equals that of its textured neighbours in the row,
+//! or of the farther one of them: the interior of a person lies between two outlines of the person,
+//! whereas the wall beside does not. Disparities that are too small are dropped like those that are
+//! too large, because removing noise on one side only would make all surfaces too far.
 
 use tagalong_core::GreyImage;
 
 use crate::share::{band_rows, share};
 
-/// Difference between disparities of one surface, px, or as a fraction: people are not flat.
+/// Largest difference between disparities of one surface, px, or as a fraction, because people are
+/// not flat.
 const SAME_PX: f32 = 0.75;
 const SAME_PART: f32 = 0.1;
 
@@ -85,7 +86,7 @@ impl Band {
     }
 }
 
-/// Carries the disparity of the last textured pixel on. By bit masks, because branches on the
+/// Propagates the disparity of the last textured pixel. It uses bit masks, because branches on the
 /// texture would be mispredicted.
 #[inline(always)]
 const fn carried(last: &mut u32, own: f32, textured: u32) -> f32 {
@@ -115,7 +116,7 @@ fn expected(a: f32, b: f32) -> f32 {
     if (a - b).abs() > tolerance(far) { far } else { mean }
 }
 
-/// Drops the pixels that have another disparity than expected, and counts them.
+/// Drops the pixels whose disparity differs from the expected one, and counts them.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn limit(row: &mut [f32], before: &[f32], behind: &[f32]) -> u32 {
     let before = &before[..row.len()];
@@ -124,7 +125,7 @@ fn limit(row: &mut [f32], before: &[f32], behind: &[f32]) -> u32 {
     for (x, value) in row.iter_mut().enumerate() {
         let expected = expected(before[x], behind[x]);
         let stays = (*value - expected).abs() <= tolerance(expected);
-        // A sum with an overflow check is no vector instruction.
+        // A sum with an overflow check cannot be vectorised.
         dropped = u32::wrapping_add(dropped, u32::from(!stays & !value.is_nan()));
         *value = if stays { *value } else { f32::NAN };
     }

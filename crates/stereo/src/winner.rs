@@ -1,4 +1,4 @@
-//! Best disparities of a row from the costs of all of them.
+//! Choice of the best disparities of a row from the costs of all disparities.
 
 /// Best disparities of a row, column by column.
 #[derive(Clone, Debug, Default)]
@@ -7,10 +7,11 @@ pub struct Winners {
     pub disparity: Vec<u8>,
     /// Lowest cost ...
     pub cost: Vec<u8>,
-    /// ... and those of the disparities below and above; the same one outside of the range.
+    /// ... and the costs of the disparities below and above; the lowest cost itself outside of the
+    /// range.
     pub below: Vec<u8>,
     pub above: Vec<u8>,
-    /// Lowest cost of a disparity that is not beside the best one.
+    /// Lowest cost of a disparity that is not adjacent to the best one.
     pub second: Vec<u8>,
 }
 
@@ -18,7 +19,8 @@ pub struct Winners {
 pub struct RowWinners<'a> {
     /// Disparities to a fraction of a pixel, px; NaN = unknown.
     pub disparities: &'a mut [f32],
-    /// Distance of the second best cost from the best one, as a fraction of the second, 0 to 255.
+    /// Difference between the second best cost and the best one, as a fraction of the second, 0 to
+    /// 255.
     pub confidences: &'a mut [u8],
 }
 
@@ -96,7 +98,7 @@ impl Winners {
 pub struct FromRight {
     /// Best cost and its disparity by column of the right image.
     best: Vec<u16>,
-    /// That disparity at the matches of the left image's pixels.
+    /// This disparity at the matches of the pixels of the left image.
     back: Vec<u8>,
 }
 
@@ -131,7 +133,7 @@ fn first<const D: usize>(sums: &[[u8; D]], cost: &[u8], disparity: &mut [u8]) {
     }
 }
 
-/// Writes the lowest costs of disparities that are not beside these.
+/// Writes the lowest costs of disparities that are not adjacent to these.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn rivals<const D: usize>(sums: &[[u8; D]], disparity: &[u8], second: &mut [u8]) {
     for ((sums, at), second) in sums.iter().zip(disparity).zip(second) {
@@ -212,7 +214,7 @@ fn judge(winners: &Winners, uniqueness: f32, found: &mut RowWinners<'_>) -> Refu
         let ahead = f32::from(second[x].saturating_sub(cost[x]));
         let outside = u32::from(d) > x as u32;
         let not_unique = !outside & (ahead < uniqueness * rival);
-        // A sum that may overflow is no vector instruction.
+        // A sum with an overflow check cannot be vectorised.
         outside_count = outside_count.wrapping_add(u32::from(outside));
         not_unique_count = not_unique_count.wrapping_add(u32::from(not_unique));
         let value = f32::from(d) + offset(below[x].into(), cost[x].into(), above[x].into());
@@ -223,9 +225,9 @@ fn judge(winners: &Winners, uniqueness: f32, found: &mut RowWinners<'_>) -> Refu
     Refused { outside: outside_count, not_unique: not_unique_count }
 }
 
-/// Returns the fraction of a pixel by a parabola through three costs. It is biased to whole pixels;
-/// two lines of equal slope, which are not, follow the noise of the sums more and had the larger
-/// error overall.
+/// Returns the fraction of a pixel by a parabola through three costs. It is biased towards whole
+/// pixels; two lines of equal slope are unbiased, but follow the noise of the sums more and had the
+/// larger error overall.
 #[inline(always)]
 fn offset(below: f32, cost: f32, above: f32) -> f32 {
     let rise = below + above - 2.0 * cost;

@@ -263,7 +263,7 @@ impl Tracker {
             }
             Outcome::ResetForward { by_s } => {
                 self.reidentifier.reset(by_s);
-                (self.table.ids(), "track: clock jumped ahead")
+                (self.table.ids(), "track: long gap in the log")
             }
             Outcome::Gap { .. } => (self.table.tentative_ids(), "track: gap in the log"),
             Outcome::Tracked | Outcome::Duplicate | Outcome::OutOfOrder => return Ok(()),

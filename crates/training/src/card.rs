@@ -14,7 +14,7 @@ use super::held_out::{Effect, Share};
 pub struct CandidateCounts {
     /// Candidates with a label.
     pub seen: u64,
-    /// Candidates that the model of the round before judged wrongly.
+    /// Candidates that the model of the previous round judged wrongly.
     pub mistakes: u64,
     /// People that were added.
     pub people: u64,
@@ -102,15 +102,15 @@ pub struct WindowCard {
     seed: u64,
     /// Training data.
     trained_on: Vec<String>,
-    /// Number of photographs; a fifth of their groups is held out for the figures, and a tenth for
-    /// the calibration.
+    /// Number of photographs; a fifth of their groups is held out for the figures, and a tenth is
+    /// used for the calibration.
     photographs: usize,
     /// Figures of the trainer.
     fit: toml::Table,
 }
 
 impl WindowCard {
-    /// Returns a card; `sources` are the folders and logs that were read.
+    /// Creates a card; `sources` are the folders and logs that were read.
     pub fn new(
         args: &TrainArgs,
         sources: Vec<String>,

@@ -1,4 +1,4 @@
-//! Training data of faces: those of FDDB in their pictures, those of CBCL as crops, and pictures
+//! Training data for faces: pictures with faces from FDDB, crops of faces from CBCL, and pictures
 //! without people.
 
 use std::fs;
@@ -13,7 +13,7 @@ use tagalong_geometry::Rect;
 
 use super::photos::{Take, candidate, fingerprint, frame, photos, read};
 
-/// Folders of the data that are read.
+/// Folders of the data.
 pub const FOLDERS: [&str; 4] =
     ["faces/fddb", "faces/cbcl-train", "people/inria-64x128/neg", "negatives"];
 
@@ -30,7 +30,7 @@ const MOST_BYTES: u64 = 200_000_000;
 /// Passes all faces and pictures of a folder of data, or one in `share`, to `take`.
 ///
 /// # Errors
-/// Missing or unreadable files, and those of `take`.
+/// Missing or unreadable files, and errors of `take`.
 pub fn visit(data: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
     let mut count = fddb(data, share, take)?;
     count += cbcl(&data.join("faces/cbcl-train.tar.gz"), share, take)?;
@@ -84,12 +84,12 @@ pub fn fddb(data: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
     Ok(count)
 }
 
-/// The failure on a file of the faces.
+/// Returns the failure on a file of the faces.
 fn wrong_file(file: &Path, why: &dyn std::fmt::Display) -> Failure {
     Failure::failed(format!("{}: {why}", file.display()))
 }
 
-/// Passes the crops of CBCL, of faces and of other things.
+/// Passes the crops of CBCL, of faces and of other objects.
 fn cbcl(archive: &Path, share: u64, take: Take<'_>) -> Result<usize, Failure> {
     let file = fs::File::open(archive).map_err(|error| wrong_file(archive, &error))?;
     let mut bytes = Vec::new();

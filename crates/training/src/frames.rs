@@ -21,7 +21,7 @@ use super::rooms::ImageTiming;
 use super::session::Session;
 use super::wide_rooms::wide_scene;
 
-/// Real rooms, and their logs.
+/// Real rooms with their logs.
 const ROOMS: [(&str, &str); 6] = [
     ("um and filinha", "um"),
     ("um and filinha", "filinha"),
@@ -31,14 +31,15 @@ const ROOMS: [(&str, &str); 6] = [
     ("uc3m", "uc3m-single-frames"),
 ];
 
-/// Scenes without `--scenes`, and in a quick training.
+/// Default number of scenes, and the number in a quick training.
 const SCENES: [u64; 2] = [400, 12];
-/// Few images per second: distant moments are more informative than neighbouring ones.
+/// A low rate of images: images that are farther apart in time are more informative.
 const LOOK: ImageTiming = ImageTiming { rate_hz: 1.0, duration_s: 3.6 };
 /// Height of the head's centre below the upper edge of a box around a person, as a fraction of the
 /// box.
 const HEAD_IN_BOX: f64 = 0.06;
-/// Part of a box in which the depth of the trunk is read: left, top, width, height.
+/// Part of a box in which the depth of the trunk is measured: left, top, width, height, as
+/// fractions.
 const TRUNK_IN_BOX: [f64; 4] = [0.25, 0.1, 0.5, 0.5];
 
 /// Simulates, reads logs, fits, writes model and card, and prints the card.
@@ -66,7 +67,7 @@ pub(super) fn train(session: &Session<'_>, trainer: &mut dyn Trainer) -> Outcome
     Ok(Ended::Well)
 }
 
-/// Passes the frames of so many simulated rooms to a trainer.
+/// Passes the frames of simulated rooms to a trainer.
 pub(super) fn show_scenes(
     session: &Session<'_>,
     scenes: u64,
@@ -85,21 +86,21 @@ pub(super) fn show_scenes(
 /// Passes the annotated frames of all real rooms in a folder of data to a trainer.
 ///
 /// # Errors
-/// A log or an annotation that cannot be read, and those of the trainer.
+/// A log or an annotation that cannot be read, and errors of the trainer.
 pub(super) fn show_rooms(data: &Path, trainer: &mut dyn Trainer) -> Result<(), Failure> {
     ROOMS.into_iter().try_for_each(|(room, log)| show_log(&data.join("logs"), log, room, trainer))
 }
 
-/// Returns the names of the logs of [`show_rooms`], as on cards.
+/// Returns the names of the logs of [`show_rooms`], as they are printed on cards.
 pub(super) fn room_logs() -> impl Iterator<Item = String> {
     ROOMS.into_iter().map(|(_, log)| format!("logs/{log}.mcap"))
 }
 
-/// Writes the models that have not seen a room, to the folder that was asked for or beside the model
-/// that has seen all.
+/// Writes the leave-one-room-out models, to the folder of the arguments or beside the model of all
+/// rooms.
 ///
 /// # Errors
-/// A folder that cannot be made, and a file that cannot be written: exit code 1.
+/// A folder that cannot be created, and a file that cannot be written: exit code 1.
 pub(super) fn write_left_out(
     session: &Session<'_>,
     left_out: &[(String, String)],
@@ -114,7 +115,7 @@ pub(super) fn write_left_out(
     Ok(())
 }
 
-/// Returns the path of the model that has not seen a room.
+/// Returns the path of the model without a room.
 fn without(model: &Path, folder: Option<&Path>, room: &str) -> PathBuf {
     let stem = model.file_stem().unwrap_or_default().to_string_lossy();
     let beside = model.with_file_name(format!("{stem}.without-{}.toml", room.replace(' ', "-")));
@@ -134,7 +135,8 @@ fn show_scene(number: u64, group: u64, trainer: &mut dyn Trainer) -> Result<(), 
     Ok(())
 }
 
-/// Converts the truth of a scene. All people count, because the trainer decides by visible surface.
+/// Converts the truth of a scene. All people count, because the trainer itself decides by their
+/// visible surface.
 fn of_truth(truth: &Truth) -> AnnotatedPerson {
     AnnotatedPerson::new(truth.head_in_robot).with_visible(truth.visible_fraction)
 }
@@ -197,7 +199,8 @@ impl RealTruth {
     }
 }
 
-/// Returns an annotated person; `None` if neither the row nor the depth in its box has a place.
+/// Returns an annotated person; `None` if neither the row nor the depth in its box gives a
+/// position.
 fn of_row(row: &people::Row, frame: &Frame) -> Option<AnnotatedPerson> {
     let head = match (row.head_in_camera_m, row.upper_body) {
         (Some(surface), _) => {
@@ -215,7 +218,7 @@ fn of_row(row: &people::Row, frame: &Frame) -> Option<AnnotatedPerson> {
     Some(AnnotatedPerson::new(head).with_counts(!row.ignore).with_visible(row.visible))
 }
 
-/// Returns the person in a box, as far away as the trunk; `None` without depth there.
+/// Returns the person in a box, at the distance of the trunk; `None` without depth there.
 fn of_box(region: &Region, frame: &Frame) -> Option<AnnotatedPerson> {
     let [left, top, width, height] = TRUNK_IN_BOX;
     let trunk = tagalong_geometry::Rect::new(

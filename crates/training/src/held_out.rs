@@ -13,22 +13,22 @@ use tagalong_pipeline::{Candidate, Fate, FrameReport, Pipeline};
 use super::in_use::pipeline;
 use super::seen::{AnnotatedFrame, Known, Label, label};
 
-/// Distance on the floor within which a track is of a person, m ...
+/// Distance on the floor within which a track belongs to a person, m.
 const TRACKED_M: f64 = 0.5;
-/// ... and false if every person is farther away than this, m.
+/// Distance on the floor to all people above which a track is false, m.
 const FALSE_M: f64 = 0.9;
 
-/// Share with its 95 % interval (Wilson), as if all of it were independent: for detections, which
-/// are not, it is too narrow.
+/// Fraction with its 95 % interval (Wilson), which assumes independent trials: for detections,
+/// which are correlated, it is too narrow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Share {
-    /// Number of successes ...
+    /// Number of successes.
     pub count: u64,
-    /// ... among this many.
+    /// Number of trials.
     pub of: u64,
-    /// Lower end of the interval of the fraction.
+    /// Lower end of the interval.
     pub lower: f64,
-    /// Its upper end.
+    /// Upper end of the interval.
     pub upper: f64,
 }
 
@@ -45,7 +45,7 @@ impl Share {
 }
 
 /// Effect of a verifier: on proposals of the detector with low thresholds, by the sign of its
-/// margin alone; on detections that the pipeline without it accepted; and on the confirmed tracks
+/// log-odds only; on detections that the pipeline without it accepted; and on the confirmed tracks
 /// of both pipelines.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Effect {
@@ -53,19 +53,21 @@ pub struct Effect {
     pub false_proposals_rejected: Share,
     /// Rejected proposals of people.
     pub people_proposals_rejected: Share,
-    /// Rejected among the accepted detections without a person.
+    /// Rejected ones of the accepted detections without a person.
     pub false_sightings_removed: Share,
-    /// Rejected among the accepted detections of people.
+    /// Rejected ones of the accepted detections of people.
     pub people_sightings_lost: Share,
-    /// Rejected among the accepted detections of a part of a person, such as a backpack.
+    /// Rejected ones of the accepted detections of a part of a person, such as a backpack.
     pub part_sightings_removed: Share,
-    /// Frames times false confirmed tracks: removed, among those without the verifier.
+    /// Frames with a false confirmed track, summed over tracks: number removed, of those without
+    /// the verifier.
     pub false_track_frames_removed: Share,
-    /// False confirmed tracks: removed, among those without the verifier.
+    /// False confirmed tracks: number removed, of those without the verifier.
     pub false_tracks_removed: Share,
-    /// Frames times people under a confirmed track: lost, among those without the verifier.
+    /// Frames of people with a confirmed track, summed over people: number lost, of those without
+    /// the verifier.
     pub tracked_people_lost: Share,
-    /// People that a confirmed track covers at any time: lost.
+    /// People with a confirmed track at any time: number lost.
     pub people_never_tracked: Share,
 }
 
@@ -81,7 +83,7 @@ pub struct Comparison {
 /// Counts over all frames.
 #[derive(Default)]
 pub struct Tally {
-    /// Rejected and all detections of people, nothing, and parts.
+    /// Rejected and all detections of people, of nothing, and of parts.
     sightings: [(u64, u64); 3],
     /// The same of proposals.
     proposals: [(u64, u64); 3],
@@ -100,10 +102,11 @@ struct Tracks {
 }
 
 impl Comparison {
-    /// Builds the pipelines: one that proposes, one without the verifier, one with it.
+    /// Builds the pipelines: one that proposes candidates, one without the verifier, and one with
+    /// it.
     ///
     /// # Errors
-    /// A config that is wrong.
+    /// A wrong config.
     pub fn new(
         [proposer, plain, verified]: [&str; 3],
         verifier: Box<dyn Verifier>,
@@ -118,7 +121,7 @@ impl Comparison {
         })
     }
 
-    /// Passes one frame to all of them.
+    /// Passes one frame to all pipelines.
     ///
     /// # Errors
     /// A plugin that fails.
@@ -146,7 +149,7 @@ impl Comparison {
 }
 
 impl Tally {
-    /// Starts a new scene, in which the numbers of people and tracks begin again.
+    /// Starts a new scene, in which the IDs of people and tracks start again.
     pub fn next_scene(&mut self) {
         self.scenes += 1;
     }
@@ -217,7 +220,7 @@ fn count(rows: &mut [(u64, u64); 3], label: Label, rejected: bool) {
     row.1 += 1;
 }
 
-/// Returns the people that count and have a track on them.
+/// Returns the people that count and have a track.
 fn covered_by(tracks: &[&Track], people: &[Known]) -> BTreeSet<i64> {
     people
         .iter()

@@ -1,4 +1,4 @@
-//! Pipelines that a verifier is trained for: one for colour and depth, one for stereo pairs.
+//! Pipelines for which a verifier is trained: one for colour and depth, one for stereo pairs.
 
 use std::path::Path;
 
@@ -14,10 +14,10 @@ const STEREO: &str = include_str!("../configs/stereo-verified.toml");
 /// Changes of the config for collecting candidates.
 const PROPOSING: &str = include_str!("proposing.toml");
 
-/// Config in use, without verifiers and controller.
+/// Config of the pipeline, without verifiers and controller.
 pub struct InUse {
     config: Table,
-    /// True if candidates are wanted that this config would not propose.
+    /// True if the thresholds are lowered, so that more candidates are proposed.
     is_lowered: bool,
 }
 
@@ -25,7 +25,7 @@ impl InUse {
     /// Returns the config for a kind of camera.
     ///
     /// # Errors
-    /// A config that is no TOML.
+    /// A config that is not TOML.
     pub fn of(kind: CameraKind) -> Result<Self, Failure> {
         let text = if kind == CameraKind::Stereo { STEREO } else { RGBD };
         let config = text.parse().map_err(Failure::failed)?;
@@ -35,12 +35,12 @@ impl InUse {
     /// Returns the config of a file, with its own thresholds, for any camera.
     ///
     /// # Errors
-    /// A file that cannot be read or is no TOML.
+    /// A file that cannot be read or is not TOML.
     pub fn as_it_is(path: &Path) -> Result<Self, Failure> {
         Ok(Self { config: without_verifiers(read_table(path)?), is_lowered: false })
     }
 
-    /// Returns the settings for depth from a pair.
+    /// Returns the settings for depth from a stereo pair.
     ///
     /// # Errors
     /// Invalid settings.
@@ -49,7 +49,7 @@ impl InUse {
         settings.try_into().map_err(Failure::failed)
     }
 
-    /// Returns the config as it is in use.
+    /// Returns the config with its own thresholds.
     pub fn plain(&self) -> String {
         self.config.to_string()
     }

@@ -26,14 +26,14 @@ const PIECES: [FurnitureKind; 8] = [
     FurnitureKind::CoatStand,
 ];
 
-/// Scans a second: neighbours in time are alike.
+/// Scans per second: consecutive scans are similar.
 const RATE_HZ: f64 = 1.0;
 const DURATION_S: f64 = 8.0;
 
-/// Passes the scans of a simulated scene to the trainer; returns their number.
+/// Passes the scans of a simulated scene to the trainer, and returns their number.
 ///
 /// # Errors
-/// A number that is no seed, or a trainer that refuses a scan.
+/// An invalid seed, or a trainer that refuses a scan.
 pub fn add(number: u64, trainer: &mut dyn Trainer) -> Result<usize, Failure> {
     let scene = scene(Split::Train.seed(number).map_err(Failure::failed)?);
     let mut simulation = Simulation::new(&scene, 1);
@@ -58,7 +58,7 @@ fn scan(simulation: &Simulation, shot: &Shot) -> Option<LaserScan> {
     Some(simulation.laser()?.scan(shot.laser.as_ref()?))
 }
 
-/// Returns a frame with nothing but a scan.
+/// Returns a frame that only has a scan.
 pub fn frame(scan: LaserScan) -> Frame {
     let camera = Arc::new(Camera::blind(Isometry3::identity()));
     Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.0), Images::default())
@@ -110,7 +110,7 @@ fn scene(seed: u64) -> Scene {
     }
 }
 
-/// Draws a place that is not at a wall.
+/// Samples a position away from the walls.
 fn place_in([length, width]: [f64; 2], chance: &mut SplitMix64) -> [f64; 2] {
     [chance.between(0.5, length - 0.5), chance.between(0.5, width - 0.5)]
 }
@@ -120,7 +120,7 @@ fn person(path: &[[f64; 2]], speed_mps: f64) -> PersonSettings {
     PersonSettings { path, speed_mps, at_end: AtEnd::Loop, ..PersonSettings::default() }
 }
 
-/// Returns a random scanner: from a cheap one to one for safety.
+/// Returns a random scanner, from a cheap one to a safety scanner.
 fn scanner(chance: &mut SplitMix64) -> LaserSettings {
     let field_of_view_deg = chance.pick(&[180.0, 240.0, 270.0, 360.0]);
     let step_deg = chance.between(0.2, 1.1);

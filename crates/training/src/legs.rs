@@ -17,8 +17,8 @@ use crate::session::Session;
 /// Folder of the bags in the data.
 const FOLDER: &str = "laser/train";
 
-/// Of a bag without people, one scan in so many is used: neighbours in time are alike, and there
-/// are far more segments without people than legs.
+/// Interval of the scans that are used from a bag without people: consecutive scans are similar,
+/// and there are far more segments without people than legs.
 const QUIET_SHARE: usize = 5;
 
 /// Card of the model.
@@ -29,7 +29,7 @@ struct LegCard {
     seed: u64,
     trained_on: Vec<String>,
     scans: usize,
-    /// Number of the simulated scans among them.
+    /// Number of simulated scans among them.
     simulated_scans: usize,
     fit: toml::Table,
 }
@@ -111,7 +111,7 @@ fn bags(session: &Session<'_>) -> Result<Vec<PathBuf>, Failure> {
     Ok(bags)
 }
 
-/// The refusal where there is no bag, with the reason.
+/// Returns the failure if there is no bag, with the reason.
 fn no_bags(session: &Session<'_>, why: &str) -> Failure {
     let text = format!("is trained on bags of laser scans: name a folder with {FOLDER}");
     Failure::usage(format!("`{}` {text} with --data{why}", session.args.plugin))
@@ -130,14 +130,14 @@ fn add_bag(bag: &Path, quick: bool, trainer: &mut dyn Trainer) -> Result<usize, 
     });
     let name = bag.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     for scan in &scans {
-        // Scanners that look elsewhere see other things, so each topic is a group.
+        // Scanners with different fields of view see different objects, so each topic is a group.
         let group = fingerprint(&format!("{name} {}", scan.topic));
         add_scan(scan, group, trainer)?;
     }
     Ok(scans.len())
 }
 
-/// Passes the legs of a scan to the trainer, and then the scan as a whole.
+/// Passes the legs of a scan to the trainer, and then the complete scan.
 fn add_scan(scan: &LegScan, group: u64, trainer: &mut dyn Trainer) -> Result<(), Failure> {
     let frame = frame(scan.scan.clone());
     let legs = scan.legs.iter().map(|leg| (leg.x, leg.y, true));

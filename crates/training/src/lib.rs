@@ -1,7 +1,7 @@
 //! `tagalong train`: trains the model file of a plugin on simulated rooms, annotated logs and
 //! photographs, and writes a card with its origin and its scores.
 //!
-//! A verifier is trained on the proposals of the detector, since these are its later inputs. The
+//! A verifier is trained on the proposals of the detector, because these are its later inputs. The
 //! first model is then applied to new rooms, and candidates that it judges wrongly or with a small
 //! margin are added before the next fit.
 //!
@@ -53,8 +53,8 @@ use self::session::Session;
 /// Runs `tagalong train`.
 ///
 /// # Errors
-/// A program without trainers, a plugin that cannot be trained and wrong settings are exit code 2; files that cannot be read or
-/// written are 1.
+/// Exit code 2 for a program without trainers, a plugin that cannot be trained and wrong settings;
+/// 1 for files that cannot be read or written.
 pub fn train(args: &TrainArgs, registry: &Registry) -> Outcome {
     if !registry.has_trainers() {
         return Err(Failure::usage(format!(

@@ -1,4 +1,4 @@
-//! Tests that pictures for testing do not resemble pictures for training.
+//! Tests that held-out pictures do not resemble training pictures.
 
 use std::path::Path;
 
@@ -13,7 +13,8 @@ use super::photos::{Photo, Take, mean_cells, photos, to_unit_length};
 
 /// Columns and rows of a small picture.
 const SMALL: (usize, usize) = (10, 20);
-/// Correlation above which two pictures show the same; different people on one meadow reach 0.904.
+/// Correlation above which two pictures show the same scene; different people on one meadow reach
+/// 0.904.
 const SAME: f32 = 0.92;
 
 /// Returns a small picture of unit length and without its mean.

@@ -12,8 +12,8 @@ use tagalong_trials::Draw;
 use super::args::TrainArgs;
 use super::session::Session;
 
-/// Scene with two people, one after the other: another room, other people and another mirror with
-/// every seed.
+/// Scene with two people, one after the other; each seed gives another room, other people and
+/// another mirror.
 const ROOM: &str = include_str!("../configs/scenes/omni-room.toml");
 /// First group number of the people in other rooms.
 const STRANGER: u64 = 100;
@@ -51,7 +51,7 @@ impl Room {
     }
 }
 
-/// Simulates, fits, writes model and card.
+/// Simulates, fits, and writes the model and the card.
 ///
 /// # Errors
 /// Scenes that do not parse, too few samples, files that cannot be written.
@@ -95,7 +95,7 @@ fn card(args: &TrainArgs, rooms: &[Room], figures: &toml::Table) -> String {
 fn show(session: &Session<'_>, room: &Room, trainer: &mut dyn Trainer) -> Result<(), Failure> {
     let scene = room.scene()?;
     session.bar.set_length((scene.duration_s * scene.camera.rate_hz) as u64);
-    // Each room has its own range of group numbers, because ids of people begin anew.
+    // Each room has its own range of group numbers, because the IDs of people start again.
     let first = if room.seed == session.args.seed { 0 } else { STRANGER * (1 + room.seed) };
     let mut draw = Draw::new(&scene, threads(None));
     while let Some(simulated) = draw.next_frame() {

@@ -13,10 +13,10 @@ use tagalong_geometry::{Camera, Distortion, ImageBox, Pinhole, Rect};
 
 use tagalong_math::{RandomSource, SplitMix64};
 
-/// Squares cut from a photograph without people.
+/// Number of squares that are cut from a photograph without people.
 const SQUARES: usize = 2;
 
-/// Body in a crop of INRIA: 96 of 128 rows tall, from row 16 on.
+/// Body in a crop of INRIA: 96 of 128 rows, from row 16 on.
 const INRIA_BODY: Rect = Rect::new(0.0, 16.0, 64.0, 96.0);
 /// Assumed height of a body, m.
 const STANDING_M: f64 = 1.7;
@@ -28,7 +28,7 @@ pub type Take<'a> = &'a mut dyn FnMut(&Frame, &Detection, Example) -> Result<(),
 pub struct Photo {
     path: PathBuf,
     kind: Kind,
-    /// Number that similar photographs share.
+    /// Group, which similar photographs have in common.
     pub group: u64,
 }
 
@@ -39,7 +39,7 @@ enum Kind {
     Nobody,
 }
 
-/// Returns all photographs of a folder of data, in order; those that are held out, or the others.
+/// Returns the photographs of a folder of data, in order, either the held-out ones or the others.
 pub fn photos(data: &Path, held_out: bool) -> Vec<Photo> {
     let mut all = Vec::new();
     let folders = [
@@ -74,7 +74,7 @@ fn pictures(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Returns the photograph of a crop: crops have its name and a letter or a number behind it.
+/// Returns the photograph of a crop: a crop has its name with a letter or a number appended.
 fn photograph(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let name = match stem.rsplit_once('_') {
@@ -84,8 +84,8 @@ fn photograph(path: &Path) -> String {
     name.to_owned()
 }
 
-/// Returns the groups of crops: photographs with consecutive numbers were taken one after the
-/// other, and often show the same people.
+/// Returns the groups of crops: photographs with consecutive numbers are in the same group, because
+/// they were taken one after another and often show the same people.
 fn runs(crops: &[PathBuf]) -> Vec<u64> {
     fn numbered(path: &Path) -> (String, u64) {
         let name = photograph(path);
@@ -107,7 +107,7 @@ fn runs(crops: &[PathBuf]) -> Vec<u64> {
     runs.collect()
 }
 
-/// Returns a number for a name (FNV-1a).
+/// Returns the hash of a name (FNV-1a).
 pub fn fingerprint(name: &str) -> u64 {
     name.bytes().fold(0xCBF2_9CE4_8422_2325, |hash, byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3)
@@ -143,7 +143,7 @@ fn busts(folder: &Path) -> Vec<Photo> {
     .collect()
 }
 
-/// Appearance of a small version of a picture, tolerant of a shift of its cut by a few pixels.
+/// Signature of a picture from a small version of it, which tolerates a shift by a few pixels.
 struct PictureSignature {
     middle: Patch,
     /// All patches of that size of the picture, and of its mirror image.
@@ -158,8 +158,8 @@ impl PictureSignature {
     const SMALL: usize = 16;
     /// ... and of its patches.
     const PATCH: usize = 12;
-    /// Correlation above which patches show the same, or people so similar that it does no harm to
-    /// keep them together. Found by eye.
+    /// Correlation above which patches show the same picture, or people so similar that it does no
+    /// harm to keep them in one group. Chosen by eye.
     const ALIKE: f32 = 0.86;
 
     fn of(image: &GreyImage) -> Self {
@@ -228,7 +228,7 @@ pub fn mean_cells(image: &GreyImage, columns: usize, rows: usize) -> Vec<f32> {
 /// Reads a picture as grey values.
 ///
 /// # Errors
-/// A file that is no picture.
+/// A file that is not a picture.
 pub fn read(path: &Path) -> Result<GreyImage, Failure> {
     let image = image::open(path)
         .map_err(|error| Failure::failed(format!("{}: {error}", path.display())))?
@@ -250,11 +250,10 @@ impl Photo {
         self.kind != Kind::Nobody
     }
 
-    /// Passes its candidates to `take`; those of pictures without people differ from round to
-    /// round.
+    /// Passes its candidates to `take`; those of pictures without people differ between rounds.
     ///
     /// # Errors
-    /// A picture that cannot be read, and those of `take`.
+    /// A picture that cannot be read, and errors of `take`.
     pub fn visit(&self, round: u64, take: Take<'_>) -> Result<(), Failure> {
         let grey = read(&self.path)?;
         let example = Example { is_person: self.is_person(), group: self.group };
@@ -276,7 +275,7 @@ impl Photo {
             }
             Kind::Bust => vec![Rect::new(0.0, 0.0, width, height).inflated(-0.08)],
             Kind::Nobody => {
-                // Other squares in each round, but the same ones in each run.
+                // The squares differ between rounds, but not between runs.
                 let mut chance = SplitMix64::new(self.group ^ round);
                 let least = width.min(height).min(40.0);
                 let most = (0.6 * width.min(height)).max(least);
@@ -294,7 +293,7 @@ impl Photo {
     }
 }
 
-/// Returns a picture as a frame of some camera.
+/// Returns a picture as a frame of a nominal camera.
 pub fn frame(grey: GreyImage) -> Frame {
     let width = grey.width();
     let height = grey.height();
@@ -306,7 +305,7 @@ pub fn frame(grey: GreyImage) -> Frame {
     Frame::new(1, Stamp::default(), camera, EgoMotion::at_rest(0.0), images)
 }
 
-/// Returns a candidate of which only the region is known.
+/// Returns a candidate for which only the region is known.
 pub fn candidate(region: Rect) -> Detection {
     let position = Point3::new(2.0, 0.0, 1.6);
     let covariance = Matrix3::identity();

@@ -3,20 +3,20 @@ use super::rooms::ImageTiming;
 
 /// Amount of simulated data.
 pub struct Plan {
-    /// Scenes of the first round and of each further one.
+    /// Number of scenes of the first round, and of each further one.
     pub scenes: [u64; 2],
     /// Further rounds.
     pub rounds: usize,
-    /// Scenes of the held-out rooms.
+    /// Number of scenes of held-out rooms.
     pub test_scenes: u64,
-    /// Few images per second: distant moments are more informative than neighbouring ones.
+    /// A low rate of images: images that are farther apart in time are more informative.
     pub look: ImageTiming,
-    /// Rate and duration for tests; tracks need more images.
+    /// Rate and duration of the scenes for tests; tracks need more images.
     pub test_look: ImageTiming,
 }
 
 impl Plan {
-    /// Returns the amount that the arguments ask for.
+    /// Returns the amount for the arguments.
     pub fn new(args: &TrainArgs) -> Self {
         let scenes = args.scenes;
         let rounds = args.rounds.map(|rounds| rounds as usize);
@@ -30,7 +30,8 @@ impl Plan {
             Self {
                 scenes: [scenes.unwrap_or(256), 64],
                 rounds: rounds.unwrap_or(2),
-                // Given scenes last as long as they say, mostly longer than these rooms.
+                // Given scenes have their own duration, which is mostly longer than that of these
+                // rooms.
                 test_scenes: if args.world.is_empty() { 36 } else { 8 },
                 look,
                 test_look,
@@ -38,7 +39,7 @@ impl Plan {
         }
     }
 
-    /// Returns the numbers of the scenes of a round; no number is repeated.
+    /// Returns the numbers of the scenes of a round, which no other round has.
     pub fn numbers(&self, round: usize, seed: u64) -> std::ops::Range<u64> {
         let [first, further] = self.scenes;
         let before = if round == 0 { 0 } else { first + (round as u64 - 1) * further };

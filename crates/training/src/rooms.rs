@@ -1,5 +1,5 @@
-//! Scenes for training and for testing: random rooms from a seed, and the suites that are used for
-//! all other tests, each with its own seeds.
+//! Scenes for training and for testing: random rooms from a seed, and the suites of all other
+//! tests, with separate seeds for training.
 
 use tagalong_config::ConfigError;
 use tagalong_math::{RandomSource, SplitMix64};
@@ -18,7 +18,7 @@ const LOOK_ALIKES: [FurnitureKind; 6] = [
     FurnitureKind::CardboardFigure,
 ];
 
-/// Suites that take turns.
+/// Suites, which are used in turn.
 const SUITES: [&str; 9] = [
     include_str!("../configs/scenes/empty-clutter.toml"),
     include_str!("../configs/scenes/office.toml"),
@@ -31,7 +31,7 @@ const SUITES: [&str; 9] = [
     include_str!("../configs/scenes/following.toml"),
 ];
 
-/// Rate and duration of a scene's images.
+/// Rate and duration of the images of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImageTiming {
     /// Images per second.
@@ -44,7 +44,7 @@ pub struct ImageTiming {
 /// depth, half of them as a stereo pair.
 ///
 /// # Errors
-/// A number that is no seed.
+/// An invalid seed.
 pub fn scene(split: Split, number: u64, look: ImageTiming) -> Result<Scene, ConfigError> {
     let turn = number / 2;
     let is_room = number.is_multiple_of(2);
@@ -62,8 +62,8 @@ pub fn scene(split: Split, number: u64, look: ImageTiming) -> Result<Scene, Conf
     Ok(scene)
 }
 
-/// Returns a room with so many people, all of it in view. Size, light, camera, furniture and the
-/// paths and appearance of the people depend on the seed.
+/// Returns a room with this number of people, all of which is in view. Size, light, camera,
+/// furniture and the paths and appearance of the people depend on the seed.
 fn room(seed: u64, people: usize) -> Scene {
     let mut chance = SplitMix64::new(seed);
     let length = chance.between(7.0, 12.0);
@@ -115,7 +115,7 @@ struct RobotView {
 }
 
 impl RobotView {
-    /// Returns a random place in view, within the detector's range and inside the room.
+    /// Returns a random position in view, within the range of the detector and inside the room.
     fn place(&self, chance: &mut SplitMix64) -> [f64; 2] {
         fn inside(at: f64, size: f64) -> f64 {
             at.clamp(0.5, size - 0.5)

@@ -1,4 +1,4 @@
-//! Frames with the truth beside them, from simulated rooms and from annotated logs.
+//! Frames with truth, from simulated rooms and from annotated logs.
 
 use std::path::Path;
 
@@ -17,20 +17,20 @@ use tagalong_trials::Draw;
 pub struct AnnotatedFrame {
     /// The frame.
     pub frame: Frame,
-    /// All people, also those that do not count.
+    /// All people, including those that do not count.
     pub people: Vec<Known>,
 }
 
 /// True position of a person.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Known {
-    /// Number of the person.
+    /// ID of the person.
     pub id: i64,
     /// Position below the head, on the floor of the robot frame, m.
     pub floor: Point2<f64>,
     /// Upper body in the image.
     pub region: Option<Rect>,
-    /// True if neither a miss nor a false alarm.
+    /// True if the person counts neither as a miss nor as a false positive.
     pub ignore: bool,
 }
 
@@ -43,7 +43,7 @@ pub enum Label {
     Part,
     /// Too near to a person for a clear label.
     Unclear,
-    /// No person is there.
+    /// There is no person.
     Nobody,
 }
 
@@ -81,11 +81,11 @@ fn overlap_with(known: &Known, candidate: &Detection) -> f64 {
 /// Callback for each frame.
 pub type See<'a> = &'a mut dyn FnMut(&AnnotatedFrame) -> Result<(), Failure>;
 
-/// Goes through a simulated scene. A stereo pair is matched, as a pipeline would; a panorama has
-/// no depth.
+/// Passes the frames of a simulated scene to `see`. A stereo pair is matched as in a pipeline; a
+/// panorama has no depth.
 ///
 /// # Errors
-/// Invalid settings, and those of `see`.
+/// Invalid settings, and errors of `see`.
 pub fn in_scene(
     scene: &Scene,
     threads: usize,
@@ -119,10 +119,10 @@ fn known(truth: &tagalong_sim::Truth) -> Known {
     }
 }
 
-/// Goes through an annotated log.
+/// Passes the frames of an annotated log to `see`.
 ///
 /// # Errors
-/// A log or a truth that cannot be used, and those of `see`.
+/// A log or a truth that cannot be used, and errors of `see`.
 pub fn in_log(log: &Path, truth: &Path, see: See<'_>) -> Result<(), Failure> {
     let input = InputSettings::default();
     let limits = Limits::default();

@@ -22,7 +22,7 @@ use super::rooms::ImageTiming;
 use super::seen::{AnnotatedFrame, Label, in_log, in_scene, label};
 use super::{rooms, seen};
 
-/// Margin below which a judgement is unsure: log-odds.
+/// Absolute log-odds below which a judgement is uncertain.
 const UNSURE: f64 = 1.0;
 
 /// State of one training.
@@ -33,7 +33,7 @@ pub struct Session<'a> {
     pub registry: &'a Registry,
     /// Amount of simulated data.
     pub plan: Plan,
-    /// Texts of the scenes that are simulated in place of random rooms.
+    /// Texts of the scenes that are simulated instead of random rooms.
     worlds: Vec<String>,
     /// Settings of the plugin.
     pub settings: toml::Table,
@@ -50,7 +50,7 @@ impl<'a> Session<'a> {
     /// Settings that cannot be read: exit code 2.
     pub fn new(args: &'a TrainArgs, registry: &'a Registry) -> Result<Self, Failure> {
         let model = args.output.clone().unwrap_or_else(|| {
-            // A cascade is a file of OpenCV's kind.
+            // A cascade is a file in OpenCV's format.
             let is_cascade = registry.training_offer(&args.plugin).data == TrainingData::Faces;
             let kind = if is_cascade { "xml" } else { "toml" };
             Path::new("configs/models").join(&args.plugin).with_extension(kind)
@@ -130,10 +130,10 @@ impl<'a> Session<'a> {
     }
 
     /// Passes candidates to the trainer: all of them in the first round, after that those that the
-    /// verifier judges wrongly or is unsure of.
+    /// verifier judges wrongly or with a small margin.
     ///
     /// # Errors
-    /// A plugin that fails, and data that cannot be read: exit code 1.
+    /// A plugin that fails, or data that cannot be read: exit code 1.
     pub fn collect_hard_negatives(
         &self,
         round: usize,
@@ -147,7 +147,8 @@ impl<'a> Session<'a> {
                 let log_odds = verifier.log_odds(frame, candidate).map_err(Failure::failed)?;
                 let right = if example.is_person { log_odds } else { -log_odds };
                 counts.mistakes += u64::from(right < 0.0);
-                // Only mistakes and unsure cases are added: the model is right about the rest.
+                // Only mistakes and uncertain cases are added, because the model is right about the
+                // rest.
                 if right >= UNSURE {
                     return Ok(());
                 }
@@ -207,7 +208,7 @@ impl<'a> Session<'a> {
         Ok(Scene { webcams: Vec::new(), ..scene.map_err(Failure::usage)? })
     }
 
-    /// Returns the pipeline that a verifier is trained for.
+    /// Returns the pipeline for which a verifier is trained.
     fn in_use(&self, kind: CameraKind) -> Result<InUse, Failure> {
         match &self.args.proposes {
             Some(path) => InUse::as_it_is(path),
@@ -220,7 +221,7 @@ impl<'a> Session<'a> {
         in_log(&path.with_extension("mcap"), &path.with_extension("people.csv"), see)
     }
 
-    /// Returns the pipeline in use, without and with the verifier.
+    /// Returns the final pipeline, without and with the verifier.
     fn comparison(&self, in_use: &InUse) -> Result<Comparison, Failure> {
         let verified = in_use.verified(&self.args.plugin, self.with_model()?);
         let configs = [in_use.proposing()?, in_use.plain(), verified];
@@ -265,7 +266,7 @@ impl<'a> Session<'a> {
     }
 }
 
-/// Passes on the detector's proposals that the truth can label.
+/// Passes on the proposals of the detector that can be labelled with the truth.
 fn propose(
     pipeline: &mut Pipeline,
     seen: &AnnotatedFrame,
@@ -292,7 +293,7 @@ fn quick_settings(registry: &Registry, plugin: &str) -> Result<toml::Table, Fail
     })
 }
 
-/// Adds the values that the settings of the user leave open, in tables of tables too.
+/// Adds the values that the settings of the user do not contain, also in nested tables.
 fn fill_in(settings: &mut toml::Table, offered: toml::Table) {
     for (key, value) in offered {
         match (settings.get_mut(&key), value) {

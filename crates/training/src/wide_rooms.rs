@@ -1,5 +1,6 @@
 //! Scenes for training a detector in depth: rooms and corridors of any size, cameras from knee to
-//! above head height, any furniture anywhere, people near and far, cut by the image and seated.
+//! above head height, any furniture anywhere, and people near and far, cut off by the image border,
+//! or seated.
 
 use tagalong_config::ConfigError;
 use tagalong_math::{RandomSource, SplitMix64};
@@ -42,13 +43,13 @@ const POSTURES: [Posture; 12] = [
     Posture::Seated,
 ];
 
-/// Numbers of people, likewise.
+/// Numbers of people, each as often as it is listed.
 const PEOPLE: [usize; 8] = [0, 1, 1, 2, 2, 3, 4, 5];
 
-/// Returns a scene of a split, in depth alone.
+/// Returns a scene of a split, with depth only.
 ///
 /// # Errors
-/// A number that is no seed.
+/// An invalid seed.
 pub fn wide_scene(split: Split, number: u64, look: ImageTiming) -> Result<Scene, ConfigError> {
     let seed = split.seed(number)?;
     let mut chance = SplitMix64::new(seed);
@@ -92,7 +93,7 @@ pub fn wide_scene(split: Split, number: u64, look: ImageTiming) -> Result<Scene,
 fn camera(chance: &mut SplitMix64) -> CameraSettings {
     let highest = chance.pick(&[1.3, 2.5]);
     let height_m = chance.between(0.3, highest);
-    // High cameras look down, those near the floor rather up.
+    // High cameras look down, and those near the floor look up.
     let pitch = match height_m {
         m if m < 0.8 => [-12.0, 8.0],
         m if m < 1.5 => [-4.0, 10.0],
@@ -122,7 +123,7 @@ struct View {
 }
 
 impl View {
-    /// Returns a random place in view or just beside it, inside the room.
+    /// Returns a random position in view or just beside it, inside the room.
     fn place(&self, chance: &mut SplitMix64, [near_m, far_m]: [f64; 2]) -> [f64; 2] {
         fn inside(at: f64, size: f64) -> f64 {
             at.clamp(0.35, size - 0.35)

@@ -1,5 +1,5 @@
-//! Training of window detectors on photographs of people; they search pictures without people for
-//! their own false positives.
+//! Training of window detectors on photographs of people; the trainers search pictures without
+//! people for false positives of their model.
 
 use std::path::Path;
 
@@ -11,13 +11,13 @@ use tagalong_app::outcome::{Ended, Failure, Outcome, print, say, write_file};
 use tagalong_config::{Example, Trainer, TrainingData};
 use tagalong_core::{Detection, Frame};
 
-/// Folders of the data that are read.
+/// Folders of the data.
 const FOLDERS: [&str; 3] = ["people/inria-64x128", "people/head-shoulder-50", "negatives"];
 
-/// Simulated rooms without `--scenes`, and in a quick training.
+/// Default number of simulated rooms, and the number in a quick training.
 const SCENES: [u64; 2] = [150, 12];
 
-/// Passes all photographs to the trainer, which holds out some of them by itself.
+/// Passes all photographs to the trainer, which itself holds out some of them.
 pub(super) fn train(
     session: &Session<'_>,
     trainer: &mut dyn Trainer,

@@ -76,9 +76,25 @@ impl GivenSequence {
         folders.retain(|folder| folder.join("seqinfo.ini").is_file());
         folders.sort();
         if folders.is_empty() {
-            return Err(given(format!("{shown} holds no folder with a seqinfo.ini")));
+            let why = if folder.join("seqinfo.ini").is_file() {
+                "is a sequence itself: name the folder above it"
+            } else {
+                "holds no folder with a seqinfo.ini"
+            };
+            return Err(given(format!("{shown} {why}")));
         }
-        folders.iter().map(|folder| Self::read(folder, &boxes_of(folder, boxes))).collect()
+        let mut all = Vec::new();
+        for folder in folders {
+            let found = boxes_of(&folder, boxes);
+            if boxes.is_none() && !found.exists() {
+                return Err(given(format!(
+                    "there is no {}; --boxes DIR names the folder of the boxes",
+                    found.display()
+                )));
+            }
+            all.push(Self::read(&folder, &found)?);
+        }
+        Ok(all)
     }
 
     /// Keeps the first of several people with the same ID in a frame of the truth; returns the
@@ -321,6 +337,17 @@ mod tests {
         let empty = tempfile::tempdir().unwrap();
         let error = GivenSequence::read_all(empty.path(), None).unwrap_err();
         assert!(error.to_string().contains("seqinfo.ini"), "{error}");
+    }
+
+    #[test]
+    fn a_sequence_itself_and_one_without_boxes_are_told_with_the_remedy() {
+        let folder = folder();
+        let walk = folder.path().join("Walk-1");
+        let error = GivenSequence::read_all(&walk, None).unwrap_err().to_string();
+        assert!(error.contains("a sequence itself: name the folder above it"), "{error}");
+        fs::remove_file(walk.join("det/det.txt")).unwrap();
+        let error = GivenSequence::read_all(folder.path(), None).unwrap_err().to_string();
+        assert!(error.ends_with("--boxes DIR names the folder of the boxes"), "{error}");
     }
 
     #[test]

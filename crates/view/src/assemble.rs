@@ -1,4 +1,4 @@
-//! Page data from recordings: one list of times for all runs.
+//! Page data from recordings, with one list of times for all runs.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,7 +12,7 @@ use tagalong_app::remedies::Remedies;
 
 use crate::recording::{FaultFacts, Recording};
 
-/// Returns the stamps of all frames of all runs, in their order.
+/// Returns the stamps of all frames of all runs, in order.
 pub fn stamps(runs: &[Recording]) -> Vec<u64> {
     let all: BTreeSet<u64> = runs.iter().flat_map(|run| &run.moments).map(stamp_of).collect();
     all.into_iter().collect()
@@ -28,7 +28,7 @@ pub fn times(stamps: &[u64]) -> Vec<f64> {
     stamps.iter().map(|stamp| ((stamp - first) as f64 * 1e-6).round() * 1e-3).collect()
 }
 
-/// Returns what a run says about each frame of the page, numbered from 1.
+/// Returns the data of a run for each frame of the page, numbered from 1.
 pub fn witness(run: &Recording, stamps: &[u64], depths: &[Option<Depths>]) -> Witness {
     let by_stamp: BTreeMap<u64, &Moment> = run.moments.iter().map(|m| (stamp_of(m), m)).collect();
     let mut witness = Witness::default();
@@ -42,14 +42,14 @@ pub fn witness(run: &Recording, stamps: &[u64], depths: &[Option<Depths>]) -> Wi
     witness
 }
 
-/// Returns a run on the times of the page.
+/// Returns a run, aligned with the times of the page.
 pub fn run_data(run: &Recording, stamps: &[u64], remedies: &Remedies) -> RunData {
     let by_stamp: BTreeMap<u64, &Moment> = run.moments.iter().map(|m| (stamp_of(m), m)).collect();
     let moments: Vec<Option<&Moment>> = stamps.iter().map(|s| by_stamp.get(s).copied()).collect();
     let times = times(stamps);
     let mut events = events::of_run(&times, &moments);
     events.extend(fault_events(&run.report.faults, &times));
-    // A fault comes before what follows from it in the same frame.
+    // A fault comes before its consequences in the same frame.
     events.sort_by_key(|event| (event.i, event.kind != FAULT));
     RunData {
         name: run.config_name(),
@@ -66,13 +66,13 @@ pub fn run_data(run: &Recording, stamps: &[u64], remedies: &Remedies) -> RunData
 /// Kind of the events of injected faults.
 const FAULT: &str = "fault";
 
-/// Returns the begin and the end of each injected fault within the times of the page.
+/// Returns the start and the end of each injected fault within the times of the page.
 fn fault_events(faults: &[FaultFacts], times: &[f64]) -> Vec<EventData> {
     let mut events = Vec::new();
     for fault in faults {
         let ends = fault.to_s.map(|to_s| (to_s, "ends"));
         for (at_s, verb) in std::iter::once((fault.from_s, "begins")).chain(ends) {
-            // The first frame that it may change.
+            // The first frame that the fault may change.
             if let Some(i) = times.iter().position(|t_s| *t_s >= at_s) {
                 let text = format!("The injected fault {} {verb}.", fault.kind);
                 events.push(EventData { i, kind: FAULT, text, ..EventData::default() });

@@ -15,7 +15,7 @@ use crate::recording::{Recording, no_frames};
 /// Writes the animation of a run.
 ///
 /// # Errors
-/// A run without pictures, a span without frames, a file that exists.
+/// A run without pictures, a span without frames, or a file that exists.
 pub fn write(args: &ViewArgs, file: &Path) -> Outcome {
     let run = [Recording::read(&args.run, &args.window()?)?];
     spare(file, args.overwrite)?;
@@ -53,7 +53,8 @@ fn paced(times_s: &[f64], fps: u32) -> Vec<usize> {
         // Times are rounded to a millisecond.
         if *time_s + 1e-3 >= due_s {
             out.push(at);
-            // From the time that was due, so that rates which do not divide each other keep the pace.
+            // Counted from the due time, so that the mean rate is kept if one rate is not a
+            // multiple of the other.
             due_s = if due_s.is_finite() { due_s } else { *time_s };
             due_s = (due_s + 1.0 / f64::from(fps)).max(*time_s);
         }

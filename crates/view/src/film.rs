@@ -1,4 +1,4 @@
-//! The log of the runs, passed once: images, laser scans, trails and the times of all frames.
+//! One pass over the log of the runs, for images, laser scans, trails and the times of all frames.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -20,7 +20,7 @@ use tagalong_render::background;
 use crate::pictures::Pictures;
 use crate::recording::Recording;
 
-/// Time that a trail reaches back, ns.
+/// Length of a trail, ns.
 const TRAIL_NS: u64 = 2_000_000_000;
 
 /// Parts of the page that come from the log.
@@ -31,7 +31,7 @@ pub struct Film {
     pub scans: Vec<Vec<i32>>,
     /// Depth images of the frames, reduced.
     pub depths: Vec<Option<Depths>>,
-    /// Directions of the edges of the view, rad.
+    /// Directions of the edges of the field of view, rad.
     pub view_rad: Option<[f64; 2]>,
     /// Times and poses of the frames.
     pub shots: Shots,
@@ -39,11 +39,11 @@ pub struct Film {
     boxes: Vec<BoxedPart>,
 }
 
-/// Opens the log of a run if it is the same file that the run read.
+/// Opens the log of a run if it is the file that the run read.
 ///
 /// # Errors
-/// A log that was asked for and cannot be read or is another one. A log that was only looked for
-/// is a sentence for the page instead.
+/// A log that the user named and that cannot be read or is another one. If the user named none, the
+/// reason why no log was found becomes a sentence on the page instead.
 pub fn open(run: &Recording, asked: Option<&Path>) -> Result<Result<FrameSource, String>, Failure> {
     let Some(path) = asked.map(Path::to_owned).or_else(|| find(run)) else {
         let name = &run.report.log.name;
@@ -52,7 +52,7 @@ pub fn open(run: &Recording, asked: Option<&Path>) -> Result<Result<FrameSource,
         )));
     };
     let outer = outer_settings(run);
-    // The right image adds nothing but the time to decode it.
+    // The right image is not shown, and decoding it would take time.
     let inputs = Inputs::ANY.without(Input::Right);
     let source = FrameSource::open(&path, &outer.input, &outer.limits, inputs);
     let shown = path.display();
@@ -71,7 +71,8 @@ pub fn open(run: &Recording, asked: Option<&Path>) -> Result<Result<FrameSource,
     }
 }
 
-/// Returns the path of the log: where it was, beside the run, or in the current folder.
+/// Returns the path of the log: its path at the time of the run, beside the run, or in the current
+/// folder.
 fn find(run: &Recording) -> Option<PathBuf> {
     let name = &run.report.log.name;
     let beside = run.folder.parent().map(|folder| folder.join(name));
@@ -79,14 +80,14 @@ fn find(run: &Recording) -> Option<PathBuf> {
     places.into_iter().flatten().find(|path| path.exists() && !path.as_os_str().is_empty())
 }
 
-/// Returns the settings by which the run read its log.
+/// Returns the settings with which the run read its log.
 fn outer_settings(run: &Recording) -> OuterSettings {
     let own = ["input", "limits", "output"];
     let tables = run.config.iter().filter(|(key, _)| own.contains(&key.as_str()));
     let tables = tables.map(|(key, value)| (key.clone(), value.clone())).collect();
     let mut outer: OuterSettings = toml::Value::Table(tables).try_into().unwrap_or_default();
-    // The topics of `[input]` are those of the real robot; a ride did not read its log by them, and the
-    // simulator writes its own.
+    // The topics of `[input]` are those of the real robot; a ride does not read its log with them,
+    // because the simulator writes its own topics.
     if run.report.ride.is_some() {
         outer.input = InputSettings::default();
     }
@@ -99,7 +100,7 @@ fn boxes_of(run: &Recording) -> BoxedPart {
 }
 
 impl Film {
-    /// Passes the log once; fills the trails of the runs on the way.
+    /// Reads the log once, and fills in the trails of the runs.
     pub fn of(
         mut source: FrameSource,
         stamps: &[u64],
@@ -153,7 +154,7 @@ impl Film {
         }
     }
 
-    /// Returns the scans; none if the log has none.
+    /// Returns the scans; `None` if the log has none.
     pub fn scans(&self) -> Option<Vec<Vec<i32>>> {
         self.scans.iter().any(|scan| !scan.is_empty()).then(|| self.scans.clone())
     }
@@ -214,7 +215,7 @@ mod tests {
         let mut frames = vec![frame([4.0, 0.0]), None, frame([4.0, 0.5])];
         add_trails_at(&mut frames, 0..2, &camera(), &Isometry2::identity());
         assert_eq!(frames[2].as_ref().unwrap().tracks[0].trail, [320, 240], "straight ahead");
-        // Turned to the left, the place is to the right in the image.
+        // After a turn to the left, the position is to the right in the image.
         let turned = Isometry2::new(Vector2::zeros(), 0.1);
         add_trails_at(&mut frames, 0..2, &camera(), &turned);
         assert_eq!(frames[2].as_ref().unwrap().tracks[0].trail, [370, 240]);

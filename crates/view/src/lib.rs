@@ -1,9 +1,9 @@
-//! `tagalong view`: one run, or two side by side, as one page that needs no network and no server;
-//! and [`Live`], the server of the same page of a run that happens now.
+//! `tagalong view`: one run, or two side by side, as one page that needs neither a network nor a
+//! server; and [`Live`], which serves the same page for a live run.
 //!
-//! A `recording` is read from the folder of a run; `assemble` puts runs on one list of times;
-//! `film` passes the log once for images, laser scans and trails; `truth` says which annotated
-//! people a run has missed; `page` has the markup, the style, the script and the data of the page.
+//! A `recording` is read from the folder of a run; `assemble` aligns runs on one list of times;
+//! `film` reads the log once for images, laser scans and trails; `truth` determines which annotated
+//! people a run missed; `page` has the markup, the style, the script and the data of the page.
 //!
 //! ```
 //! use clap::Parser as _;
@@ -63,10 +63,10 @@ pub struct ViewArgs {
     /// Replace an existing page.
     #[arg(long)]
     pub overwrite: bool,
-    /// The log of the run, for its images [default: where it was when the run was made].
+    /// The log of the run, for its images [default: its path at the time of the run].
     #[arg(long, value_name = "LOG")]
     pub log: Option<PathBuf>,
-    /// The truth [default: beside the log, as for `bench`, or in it].
+    /// The truth [default: the file beside the log, as for `bench`, or the truth in the log].
     #[arg(long, value_name = "FILE")]
     pub truth: Option<PathBuf>,
     /// Show frames from this time on, in seconds since the first.
@@ -75,8 +75,8 @@ pub struct ViewArgs {
     /// Show frames up to this time, in seconds since the first.
     #[arg(long, value_name = "S")]
     pub to: Option<f64>,
-    /// Size of the page, in megabytes: images become smaller, and if that does not suffice, frames are
-    /// left out evenly [default: 25; 6 for each of many rides].
+    /// Largest size of the page, in megabytes: images are made smaller, and if that is not enough,
+    /// frames are left out evenly [default: 25; 6 for each of many rides].
     #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub max_mb: Option<u32>,
     /// Write an animation (GIF) of the pictures of `run --overlay` instead of the page.
@@ -85,16 +85,16 @@ pub struct ViewArgs {
     /// Width of the animation, in pixels.
     #[arg(long, value_name = "PX", default_value_t = 480, requires = "animation", value_parser = clap::value_parser!(u32).range(64..=4096))]
     pub width: u32,
-    /// Pictures of the animation for each second of the log, shown at that pace.
+    /// Pictures of the animation per second of the log, shown at that rate.
     #[arg(long, value_name = "HZ", default_value_t = 8, requires = "animation", value_parser = clap::value_parser!(u32).range(1..=50))]
     pub fps: u32,
 }
 
-/// Frames that are read for each megabyte of the page: more than it has room for, as a frame with one
+/// Number of frames that are read per megabyte of the page: more than fit, because a frame with one
 /// track takes half a kilobyte.
 const FRAMES_PER_MB: usize = 2000;
 
-/// Size of the page of a run, MB.
+/// Default size of the page of a run, MB.
 const PAGE_MB: u32 = 25;
 
 /// Name of the page in the folder of a run.
@@ -105,7 +105,7 @@ impl ViewArgs {
         [Some(&self.run), self.other.as_ref()].into_iter().flatten()
     }
 
-    /// Reads the runs, which are of one log.
+    /// Reads the runs, which must be of the same log.
     fn recordings(&self) -> Result<Vec<Recording>, Failure> {
         let window = self.window()?;
         let read = self.folders().map(|folder| Recording::read(folder, &window));
@@ -138,11 +138,11 @@ Examples:
   tagalong view runs/robot-depth-verified --log /data/robot.mcap --truth robot.people.csv
   tagalong view runs/robot-depth-verified --from 30 --to 36 --animation clip.gif    (after run --overlay)";
 
-/// Writes the page of one run or two.
+/// Writes the page of one or two runs.
 ///
 /// # Errors
-/// A folder that is no run, two runs of different logs, a log or a truth that was named and cannot
-/// be used, a file of the name given with `-o` that exists.
+/// A folder that is not a run, two runs of different logs, a log or a truth that the user named and
+/// that cannot be used, or an existing file with the name given with `-o`.
 pub fn view(args: &ViewArgs, registry: &Registry) -> Outcome {
     if let Some(file) = &args.animation {
         return clip::write(args, file);
@@ -154,7 +154,7 @@ pub fn view(args: &ViewArgs, registry: &Registry) -> Outcome {
     let args = ViewArgs { run: rides::run_of(&args.run), ..args.clone() };
     let output = args.output.clone().unwrap_or_else(|| args.run.join(PAGE));
     let runs = args.recordings()?;
-    // The page in the folder of a run is made from that folder, and made anew each time.
+    // The page in the folder of a run only depends on that folder, and may be overwritten.
     if args.output.is_some() {
         spare(&output, args.overwrite)?;
     }
@@ -230,7 +230,7 @@ fn heading(runs: &[Recording], data: &PageData, notes: &[String]) -> Heading {
     Heading { log, runs: lines, notes: notes.to_vec() }
 }
 
-/// Returns the frames of the runs, every second or third where all would be too long.
+/// Returns the frames of the runs, or every second or third one if the page would be too large.
 fn thinned(
     runs: &[Recording],
     all: Vec<u64>,
@@ -266,7 +266,7 @@ fn image_size(runs: &[Recording]) -> [usize; 2] {
     moments.find(|m| m.notes.image_px[0] > 0).map_or([0, 0], |m| m.notes.image_px)
 }
 
-/// Gives runs of one config the names of their folders.
+/// Names runs of the same config after their folders.
 fn name_apart(data: &mut [RunData], runs: &[Recording]) {
     let are_alike = data.len() == 2 && data[0].name == data[1].name;
     for (run, recording) in data.iter_mut().zip(runs).filter(|_| are_alike) {
@@ -274,7 +274,7 @@ fn name_apart(data: &mut [RunData], runs: &[Recording]) {
     }
 }
 
-/// Adds what the log has: images, scans, trails, and the truth with it.
+/// Adds the data of the log: images, scans, trails, and the truth.
 fn add_log(
     data: &mut PageData,
     runs: &[Recording],
@@ -300,7 +300,7 @@ fn add_log(
         for (run, recording) in data.runs.iter_mut().zip(runs) {
             let witness = witness(recording, stamps, &film.depths);
             let rules = Rules { remedies, config: &recording.config };
-            // Contradictions are those of the truth: the page is of use without it.
+            // A contradiction is a fault of the truth, without which the page is still useful.
             if let Err(why) = truth.judge(&data.t, data.image_px, run, (&witness, rules)) {
                 notes.push(format!("{} is not compared with the truth: {why}", run.name));
             }

@@ -1,4 +1,4 @@
-//! Images of the log as small JPEGs within a bound on their sum.
+//! Images of the log as small JPEGs, with a limit on their total size.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -9,10 +9,10 @@ use tagalong_render::jpeg;
 /// Widths and qualities of JPEG, best first.
 const LEVELS: [(usize, u8); 5] = [(640, 72), (480, 65), (400, 55), (320, 50), (240, 40)];
 
-/// Encoder that keeps the sum of its images within a bound.
+/// Encoder that keeps the total size of its images below a limit.
 pub struct Pictures {
     images: Vec<String>,
-    /// Bytes of base64 that one image may have on average.
+    /// Average limit of one image, bytes of base64.
     share: usize,
     left: usize,
     level: usize,
@@ -21,17 +21,17 @@ pub struct Pictures {
 }
 
 impl Pictures {
-    /// Returns an encoder for `frames` images with at most `bytes` of base64 in all.
+    /// Creates an encoder for `frames` images with at most `bytes` of base64 in total.
     pub fn within(bytes: usize, frames: usize) -> Self {
         let share = bytes / frames.max(1);
         let images = vec![String::new(); frames];
         Self { images, share, left: bytes, level: 0, left_out: 0, width: 0 }
     }
 
-    /// Adds the image of a frame, as well as the bound allows.
+    /// Adds the image of a frame, with the best quality that the limit allows.
     pub fn add(&mut self, at: usize, image: &RgbImage) {
         let mut text = encode(image, LEVELS[self.level]);
-        // Levels go down for all later images, so that neighbours look alike.
+        // The level is lowered for all later images, so that consecutive images look alike.
         while text.len() > self.share && self.level + 1 < LEVELS.len() {
             self.level += 1;
             text = encode(image, LEVELS[self.level]);
@@ -47,7 +47,7 @@ impl Pictures {
         }
     }
 
-    /// Describes the images in a sentence; none if there are none.
+    /// Describes the images in a sentence; `None` if there are none.
     pub fn summary(&self) -> Option<String> {
         let count = self.images.iter().filter(|text| !text.is_empty()).count();
         let bytes: usize = self.images.iter().map(String::len).sum();
@@ -64,7 +64,7 @@ impl Pictures {
         }
     }
 
-    /// Returns the images in base64; none if there are none.
+    /// Returns the images in base64; `None` if there are none.
     pub fn into_images(self) -> Option<Vec<String>> {
         self.images.iter().any(|text| !text.is_empty()).then_some(self.images)
     }

@@ -1,4 +1,4 @@
-//! Run as it was recorded: frames with tracks, candidates and funnel, and its config.
+//! Recorded run: frames with tracks, candidates and funnel, and its config.
 
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ use toml::Table;
 
 /// Topic of the tracks as JSON in `tracks.mcap`.
 const TRACKS_TOPIC: &str = "/people/tracks_json";
-/// Least time that a result shows, s.
+/// Least time that is shown in a result, s.
 const SHOWN_S: f64 = 0.05;
 
 /// Run of a pipeline over a log.
@@ -30,39 +30,39 @@ pub struct Recording {
     pub origin: Origin,
     /// Resolved config; empty if it cannot be read.
     pub config: Table,
-    /// Frames in the order of their stamps, as far as the window lets them in.
+    /// Frames inside of the window, in the order of their stamps.
     pub moments: Vec<Moment>,
-    /// One frame in so many is there.
+    /// Interval of the frames: 1 if all are there, 2 for every second one.
     pub every: u64,
-    /// Time of the last frame of the run, in the window or not, s since the first.
+    /// Time of the last frame of the run, inside of the window or not, s since the first.
     pub length_s: f64,
 }
 
 /// Part of a log, s since its first frame.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Span {
-    /// First time; none for the beginning.
+    /// First time; `None` for the beginning.
     pub from_s: Option<f64>,
-    /// Last time; none for the end.
+    /// Last time; `None` for the end.
     pub to_s: Option<f64>,
 }
 
-/// Frames that are read: a run of a day must not fill the memory.
+/// Limits on the frames that are read, because a run of a day must not fill the memory.
 #[derive(Clone, Copy, Debug)]
 pub struct Window {
     /// Part of the log.
     span: Span,
     /// First frame of all runs, ns.
     first_ns: u64,
-    /// At most so many; of more, every second, fourth or eighth is kept.
+    /// Largest number of frames; if there are more, every second, fourth or eighth is kept.
     most: usize,
 }
 
 impl Window {
-    /// Opens a window on the runs of some folders.
+    /// Creates a window on the runs of some folders.
     ///
     /// # Errors
-    /// A folder that is no run, or one without notes on its frames.
+    /// A folder that is not a run, or a run without data on its frames.
     pub fn of<'a>(
         folders: impl IntoIterator<Item = &'a PathBuf>,
         span: Span,
@@ -92,7 +92,7 @@ pub struct ReportFacts {
     pub log: FileFacts,
     /// The config.
     pub config: FileFacts,
-    /// Result of a ride; none for a run over a log.
+    /// Result of a ride; `None` for a run over a log.
     pub ride: Option<RideFacts>,
     /// Faults that were injected into a ride.
     #[serde(default)]
@@ -106,7 +106,7 @@ pub struct FaultFacts {
     pub kind: String,
     /// Its begin, s since the first frame.
     pub from_s: f64,
-    /// Its end, s; none for that of the ride.
+    /// Its end, s; `None` if it lasts to the end of the ride.
     pub to_s: Option<f64>,
 }
 
@@ -118,53 +118,54 @@ impl FaultFacts {
     }
 }
 
-/// Result of a ride, as `tagalong follow` judges it.
+/// Result of a ride, as determined by `tagalong follow`.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub struct RideFacts {
     /// Seed of the scene.
     pub seed: u64,
-    /// True if the person was followed, or rightly given up, and no other person for long.
+    /// True if the person was followed, or correctly given up, and no other person was followed for
+    /// long.
     pub kept: bool,
-    /// Commonest reason of the commands of a robot that never moved.
+    /// Most frequent reason of the commands of a robot that never moved.
     pub never_moved: Option<String>,
     /// Length of the ride, s.
     pub time_s: f64,
     /// Time in which the person was in view, s.
     pub in_view_s: f64,
-    /// Time in which the lock was on another person or a thing, s; also while the robot stood.
+    /// Time in which the lock was on another person or an object, s, including times at rest.
     pub wrong_s: f64,
-    /// Time in which the person was followed and walked slowly, s ...
+    /// Time in which the person was followed and walked slowly, s.
     pub slow_s: f64,
-    /// ... and the distance was kept, s.
+    /// Part of that time in which the distance was kept, s.
     pub distance_kept_s: f64,
-    /// Least room to people while the robot moved, m.
+    /// Least clearance from people while the robot moved, m.
     pub clearance_people_m: Option<f64>,
-    /// Least room to things while the robot moved, m.
+    /// Least clearance from objects while the robot moved, m.
     pub clearance_things_m: Option<f64>,
-    /// Time of the least room, s.
+    /// Time of the least clearance, s.
     pub nearest_s: Option<f64>,
-    /// Times without the person after the first with them.
+    /// Periods without the person after the first period with the person.
     pub episodes: Vec<EpisodeFacts>,
 }
 
-/// Time of a ride without the person.
+/// Period of a ride without the person.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub struct EpisodeFacts {
-    /// Since when, s.
+    /// Start, s.
     pub lost_s: f64,
-    /// When the person was followed again, s.
+    /// Time at which the person was followed again, s.
     pub found_s: Option<f64>,
 }
 
 impl RideFacts {
-    /// Returns the least room to anything while the robot moved, m.
+    /// Returns the least clearance from people and objects while the robot moved, m.
     pub fn room_m(&self) -> Option<f64> {
         [self.clearance_people_m, self.clearance_things_m].into_iter().flatten().reduce(f64::min)
     }
 
-    /// Returns true if the robot touched a person or a thing while it moved.
+    /// Returns true if the robot touched a person or an object while it moved.
     pub fn touches(&self) -> bool {
         self.room_m().is_some_and(|room| room < 0.0)
     }
@@ -174,13 +175,13 @@ impl RideFacts {
         (self.slow_s > 0.0).then(|| self.distance_kept_s / self.slow_s)
     }
 
-    /// Returns the time from which on nobody was followed until the end, s.
+    /// Returns the time from which no person was followed until the end, s.
     pub fn lost_to_the_end_s(&self) -> Option<f64> {
         self.episodes.last().filter(|it| it.found_s.is_none()).map(|it| it.lost_s)
     }
 
-    /// Returns whether the person was kept, in words: a ride that ends without the person says so, also
-    /// where nothing better was possible.
+    /// Returns whether the person was kept, in words. A ride that ends without the person says so,
+    /// even if no better result was possible.
     pub fn kept_in_words(&self) -> String {
         match (self.kept, self.lost_to_the_end_s()) {
             (true, None) => "the person was kept".to_owned(),
@@ -207,7 +208,7 @@ impl RideFacts {
         let stands = self.never_moved.as_ref();
         let stands = stands.map_or(String::new(), |why| format!("; the robot never moved ({why})"));
         format!(
-            "{}{stands}{}; least room to people {}, to things {}; distance kept for {share} of the time in \
+            "{}{stands}{}; least room from the edge of the robot to people {}, to things {}; distance kept for {share} of the time in \
              which the person was followed and walked slowly; {wrong}",
             self.kept_in_words(),
             if self.touches() { "; the robot touched something" } else { "" },
@@ -238,7 +239,8 @@ impl Recording {
     /// Reads the folder of a run.
     ///
     /// # Errors
-    /// A folder that is no run, or one without notes on its frames; names the remedy.
+    /// A folder that is not a run, or a run without data on its frames; the message names the
+    /// remedy.
     pub fn read(folder: &Path, window: &Window) -> Result<Self, Failure> {
         let tracks = tracks_of(folder)?;
         let report = read_json(&folder.join("report.json"))?;
@@ -298,7 +300,7 @@ fn no_run(folder: &Path) -> Failure {
 /// Reads a JSON file.
 ///
 /// # Errors
-/// A file that cannot be read, or holds something else.
+/// A file that cannot be read, or has another format.
 pub fn read_json<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<T, Failure> {
     let shown = path.display();
     let text = read_text(path, FileLimit::Table)
@@ -306,11 +308,11 @@ pub fn read_json<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<T, Failure
     serde_json::from_str(&text).map_err(|error| Failure::failed(format!("{shown}: {error}")))
 }
 
-/// Frames of a file of tracks, one after the other.
+/// Iterator over the frames of a file of tracks.
 struct Frames {
     shown: String,
     walker: LogWalker<LogFile>,
-    /// Tracks of the frame whose notes come next.
+    /// Tracks of the frame whose data come next.
     tracks: Option<TracksMessage>,
 }
 
@@ -321,7 +323,7 @@ impl Frames {
         Ok(Self { shown: path.display().to_string(), walker, tracks: None })
     }
 
-    /// Returns the next frame; none at the end. A frame that was cut in two is left out.
+    /// Returns the next frame; `None` at the end. An incomplete frame is left out.
     fn next_moment(&mut self) -> Result<Option<Moment>, Failure> {
         let shown = &self.shown;
         while let Some(message) = self.walker.next() {
@@ -353,7 +355,7 @@ impl Frames {
     }
 }
 
-/// Reads the JSON of a message; a failure names its file and topic.
+/// Parses the JSON of a message; a failure names its file and topic.
 fn json_of_topic<T: DeserializeOwned>(text: &str, file: &str, topic: &str) -> Result<T, Failure> {
     serde_json::from_str(text).map_err(|error| Failure::failed(format!("{file}: {topic}: {error}")))
 }
@@ -366,8 +368,8 @@ pub fn no_frames(runs: &[Recording]) -> Failure {
     ))
 }
 
-/// Gathers the frames of a window, and returns them, one in how many that is, and the time of the last
-/// frame of all, s since the first.
+/// Collects the frames of a window; returns them with their interval, and the time of the last
+/// frame of the run, s since the first.
 fn gather(
     mut next: impl FnMut() -> Result<Option<Moment>, Failure>,
     window: &Window,
@@ -390,7 +392,7 @@ fn gather(
     Ok((kept, every, (last_ns - window.first_ns) as f64 * 1e-9))
 }
 
-/// Tells by the number of a frame, so that two runs of one log keep the same frames.
+/// Decides by the number of a frame, so that two runs of one log keep the same frames.
 fn is_kept(moment: &Moment, every: u64) -> bool {
     moment.notes.frame.saturating_sub(1).is_multiple_of(every)
 }

@@ -1,4 +1,4 @@
-//! Folder of rides, as `tagalong follow -o` writes it: a page for each ride, and a list of them with
+//! Folder of rides that `tagalong follow -o` wrote: a page for each ride, and a list of them with
 //! the worst first.
 
 use std::path::{Path, PathBuf};
@@ -15,14 +15,14 @@ use crate::page::html::style;
 use crate::recording::{RideFacts, read_json};
 use crate::{PAGE, Page, ViewArgs};
 
-/// Results of all rides of a folder.
+/// File with the results of all rides of a folder.
 const RESULTS: &str = "follow.json";
-/// List of the rides.
+/// File with the list of the rides.
 const INDEX: &str = "index.html";
-/// Size of the page of one ride of many, MB.
+/// Default size of the page of one of many rides, MB.
 const RIDE_MB: u32 = 6;
 
-/// Content of [`RESULTS`], as far as the list shows it.
+/// Content of [`RESULTS`] that the list shows.
 #[derive(Debug, Deserialize)]
 struct Results {
     rides: Vec<Ride>,
@@ -35,7 +35,7 @@ struct Ride {
     suite: String,
     /// Name of the pipeline.
     pipeline: String,
-    /// Name of its folder; none in results of earlier versions.
+    /// Name of its folder; `None` in results of earlier versions.
     #[serde(default)]
     folder: Option<String>,
     #[serde(flatten)]
@@ -47,7 +47,7 @@ pub fn is_folder_of_rides(folder: &Path) -> bool {
     !folder.join("tracks.mcap").exists() && folder.join(RESULTS).is_file()
 }
 
-/// Returns the folder of a ride for its log, and any other path as it is.
+/// Returns the folder of a ride for the path of its log, and any other path unchanged.
 pub fn run_of(path: &Path) -> PathBuf {
     let beside = path.with_extension("");
     let is_ride = path.is_file() && beside.join("tracks.mcap").is_file();
@@ -57,7 +57,7 @@ pub fn run_of(path: &Path) -> PathBuf {
 /// Writes the page of each ride of a folder, and the list of all.
 ///
 /// # Errors
-/// Results that cannot be read, rides without a folder, pages that exist.
+/// Results that cannot be read, rides without a folder, or pages that exist.
 pub fn view_rides(args: &ViewArgs, remedies: &Remedies) -> Outcome {
     let folder = &args.run;
     let index = args.output.clone().unwrap_or_else(|| folder.join(INDEX));
@@ -97,7 +97,7 @@ pub fn view_rides(args: &ViewArgs, remedies: &Remedies) -> Outcome {
     Ok(Ended::Well)
 }
 
-/// Refuses to replace the page of a ride, which has its place whatever the list is called.
+/// Refuses to replace the page of a ride, whose path does not depend on the name of the list.
 fn spare_page(page: &Path, overwrite: bool) -> Result<(), Failure> {
     if page.exists() && !overwrite {
         let shown = page.display();
@@ -109,7 +109,7 @@ fn spare_page(page: &Path, overwrite: bool) -> Result<(), Failure> {
 }
 
 /// Orders rides: those with a contact first, then those in which the robot never moved, then by the
-/// least room, then by the share of the time in which the distance was kept.
+/// least clearance, then by the share of the time in which the distance was kept.
 fn worse_first(a: &RideFacts, b: &RideFacts) -> std::cmp::Ordering {
     fn room(ride: &RideFacts) -> f64 {
         ride.room_m().unwrap_or(f64::INFINITY)
@@ -128,7 +128,8 @@ fn worse_first(a: &RideFacts, b: &RideFacts) -> std::cmp::Ordering {
 
 impl Ride {
     fn folder(&self, parent: &Path) -> Result<&str, Failure> {
-        // A name, and no way out of the folder: the results may come from elsewhere.
+        // Only a plain name, not a path out of the folder, because the results may come from
+        // elsewhere.
         let name = self
             .folder
             .as_deref()
@@ -143,7 +144,7 @@ impl Ride {
         })
     }
 
-    /// Returns the address of its page.
+    /// Returns the URL of its page.
     fn link(&self, from: Option<&Path>) -> String {
         let name = self.folder.as_deref().unwrap_or_default();
         let at = self.facts.nearest_s.map_or(String::new(), |at_s| format!("#t={at_s:.1}"));
@@ -153,7 +154,7 @@ impl Ride {
     }
 }
 
-/// Returns a character of a path as an address has it.
+/// Returns a character of a path, escaped for a URL.
 fn encoded(letter: char) -> String {
     match letter {
         ' ' => "%20".into(),
@@ -199,8 +200,8 @@ fn list(folder: &Path, from: Option<&Path>, rides: &[Ride]) -> String {
         .into_string()
 }
 
-/// Script that gives the table its roles, which a row of cells one below the other, as a phone shows it,
-/// would not have.
+/// Script that sets the ARIA roles of the table, which are lost when a phone shows the cells of a
+/// row below each other.
 const ROLES: &str = r#""use strict";
 const roles = { TABLE: "table", THEAD: "rowgroup", TBODY: "rowgroup", TR: "row", TD: "cell" };
 for (const part of document.querySelectorAll("table, table *")) {
@@ -208,7 +209,7 @@ for (const part of document.querySelectorAll("table, table *")) {
   if (role) part.setAttribute("role", role);
 }"#;
 
-/// Names of the columns after the first, which a phone shows beside each value.
+/// Names of the columns after the first one, which a phone shows beside each value.
 const COLUMNS: [&str; 7] = [
     "Contact",
     "Room to people",
@@ -246,7 +247,7 @@ fn table(rides: &[Ride], from: Option<&Path>) -> Markup {
     }
 }
 
-/// Returns whether the person was kept, and the reason of a robot that never moved.
+/// Returns whether the person was kept, and the reason if the robot never moved.
 fn kept(ride: &RideFacts) -> String {
     let lost =
         ride.lost_to_the_end_s().map_or(String::new(), |at_s| format!(", lost at {at_s:.1} s"));
@@ -321,6 +322,7 @@ mod tests {
         assert!(page.contains("no; the robot never moved (silent)"), "{page}");
         let summary = rides[1].facts.summary();
         assert!(summary.contains("the robot never moved (silent)"), "{summary}");
+        assert!(summary.contains("least room from the edge of the robot to people"), "{summary}");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Annotated people beside the runs, and which of them each run has missed.
+//! Annotated people, and which of them each run missed.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -20,11 +20,11 @@ use crate::page::data::{EventData, FrameData, RunData, TruthBox};
 /// Truth by frame of the page.
 pub struct PageTruth {
     file: TruthFile,
-    /// Signs that it is the truth of another log.
+    /// Indications that it is the truth of another log.
     pub signs: Vec<String>,
     /// People that are annotated in each frame.
     pub frames: Vec<Vec<TruthBox>>,
-    /// As they are scored.
+    /// The same people in the form for scoring.
     people: Vec<(Vec<Truth>, Vec<Region>)>,
 }
 
@@ -57,15 +57,15 @@ impl PageTruth {
         Ok(Self { file, frames, people, signs })
     }
 
-    /// Returns true if any frame has anyone.
+    /// Returns true if any frame has a person.
     pub fn has_people(&self) -> bool {
         self.frames.iter().any(|frame| !frame.is_empty())
     }
 
-    /// Matches a run with the truth; adds its hits, and its misses with their causes.
+    /// Matches a run with the truth, and adds its hits and its misses with their causes.
     ///
     /// # Errors
-    /// Truth that contradicts itself, in a sentence.
+    /// A sentence on truth that contradicts itself.
     pub fn judge(
         &self,
         times: &[f64],
@@ -139,7 +139,7 @@ fn shown(truth: &Truth, odom_from_robot: &Isometry2<f64>) -> TruthBox {
     }
 }
 
-/// Returns the tracks of a frame as `tracks.csv` has them: confirmed, seen and inside the image.
+/// Returns the tracks of a frame that `tracks.csv` contains: confirmed, seen and inside the image.
 fn reports(frame: &FrameData, size: [usize; 2]) -> Vec<Report> {
     let (sin, cos) = frame.robot[2].sin_cos();
     let seen = frame.tracks.iter().filter(|track| track.state == "seen");
@@ -158,12 +158,13 @@ fn reports(frame: &FrameData, size: [usize; 2]) -> Vec<Report> {
     reports.collect()
 }
 
-/// Returns true for a miss before the first person is found: no track can be confirmed at once.
+/// Returns true for a miss before the first person is found, because no track can be confirmed at
+/// once.
 fn is_early_miss(event: &Event, found_at: Option<usize>) -> bool {
     matches!(event.kind, EventKind::Miss { .. }) && found_at.is_none_or(|at| event.frame <= at)
 }
 
-/// Describes the misses before the first person is found, frame by frame: those of one frame are one event.
+/// Describes the misses before the first person is found; those of one frame are one event.
 fn missed_early(early: &[&Event]) -> Vec<EventData> {
     let mut told = Vec::new();
     for of_frame in early.chunk_by(|a, b| a.frame == b.frame) {
@@ -193,7 +194,7 @@ fn missed_early(early: &[&Event]) -> Vec<EventData> {
     told
 }
 
-/// Describes an event of the comparison; people found again are told by the run itself.
+/// Describes an event of the comparison; the run itself reports people who are found again.
 fn described(event: &Event) -> Option<EventData> {
     let (kind, person, track, text) = match event.kind {
         EventKind::Miss { person, track } => {

@@ -13,6 +13,7 @@ mod package;
 mod program;
 mod record;
 mod rehearse;
+mod remove_plugin;
 mod sentences;
 mod tidy;
 mod try_out;
@@ -97,14 +98,20 @@ enum Command {
 #[derive(Args)]
 struct NewPlugin {
     /// Kind of the plugin.
-    #[arg(required_unless_present = "try_out")]
+    #[arg(required_unless_present_any = ["try_out", "remove"])]
     kind: Option<Kind>,
     /// Its name in configs, for example `leg-width`.
-    #[arg(required_unless_present = "try_out")]
+    #[arg(required_unless_present_any = ["try_out", "remove"])]
     name: Option<String>,
     /// Generate one of each kind in a copy of the workspace and test them there.
     #[arg(long = "try", conflicts_with_all = ["kind", "name"])]
     try_out: bool,
+    /// Remove the plugin of this name again: its folder, its config and its lines in the lists.
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["kind", "name", "try_out"])]
+    remove: Option<String>,
+    /// Remove it even if its files were changed since.
+    #[arg(long, requires = "remove")]
+    force: bool,
 }
 
 fn main() -> ExitCode {
@@ -124,6 +131,11 @@ fn run(command: Command) -> Result<()> {
             new_plugin::create(&workspace, kind, &name)?;
             new_plugin::format(&workspace, &name)?;
             eprintln!("{}", new_plugin::what_now(kind, &name));
+            Ok(())
+        }
+        Command::NewPlugin(NewPlugin { remove: Some(name), force, .. }) => {
+            remove_plugin::remove(&workspace, &name, force)?;
+            eprintln!("plugins/{name}, configs/{name}.toml and its lines in the lists are removed");
             Ok(())
         }
         Command::NewPlugin(_) => try_out::try_out(&workspace),

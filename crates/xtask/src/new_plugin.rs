@@ -71,20 +71,31 @@ pub fn create(workspace: &Workspace, kind: Kind, name: &str) -> Result<()> {
     // All checks come first, so that a wrong name leaves nothing behind.
     check_name(workspace, name)?;
     let lists = lists_with(workspace, name)?;
+    for (path, text) in files_of(kind, name) {
+        workspace.write(path, &text)?;
+    }
+    lists.iter().try_for_each(|(path, text)| workspace.write(path, text))
+}
+
+/// Returns the files of a plugin, by their paths relative to the root.
+fn files_of(kind: Kind, name: &str) -> Vec<(String, String)> {
     let template = kind.template();
     let folder = format!("plugins/{name}");
     let (verb, verb_text) = template.verb;
-    for (path, text) in [
+    let files = [
         (format!("{folder}/Cargo.toml"), MANIFEST),
         (format!("{folder}/README.md"), template.readme),
         (format!("{folder}/src/lib.rs"), template.lib),
         (format!("{folder}/src/config.rs"), template.config),
         (format!("{folder}/src/{verb}.rs"), verb_text),
         (format!("configs/{name}.toml"), template.pipeline),
-    ] {
-        workspace.write(path, &fill(text, name))?;
-    }
-    lists.iter().try_for_each(|(path, text)| workspace.write(path, text))
+    ];
+    files.map(|(path, text)| (path, fill(text, name))).into()
+}
+
+/// Returns the files of a plugin for each kind that it may be of.
+pub fn generated(name: &str) -> Vec<Vec<(String, String)>> {
+    Kind::value_variants().iter().map(|kind| files_of(*kind, name)).collect()
 }
 
 /// Formats the new crate: where a line breaks depends on the length of its name.
@@ -107,7 +118,8 @@ pub fn what_now(kind: Kind, name: &str) -> String {
          in. Say in its first line for what it is to be taken.\n\
          Write the method in plugins/{name}/src/{verb}.rs, its settings in src/config.rs, then\n\
          \n    cargo test -p tagalong-{name} && cargo test -p tagalong-tests --test conformance\n    \
-         cargo run --release -- {tried}\n"
+         cargo run --release -- {tried}\n\n\
+         `cargo xtask new-plugin --remove {name}` takes it away again.\n"
     )
 }
 
@@ -115,7 +127,8 @@ fn is_word(text: &str) -> bool {
     !text.is_empty() && text.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit())
 }
 
-fn check_name(workspace: &Workspace, name: &str) -> Result<()> {
+/// Checks that a name can be that of a plugin.
+pub fn check_form(name: &str) -> Result<()> {
     let well_formed = name.starts_with(|c: char| c.is_ascii_lowercase())
         // Names become parts of crate names, module names and paths.
         && name.split('-').all(is_word);
@@ -123,6 +136,11 @@ fn check_name(workspace: &Workspace, name: &str) -> Result<()> {
         well_formed,
         "`{name}` cannot name a plugin: use lower-case words joined by hyphens, like `leg-width`"
     );
+    Ok(())
+}
+
+fn check_name(workspace: &Workspace, name: &str) -> Result<()> {
+    check_form(name)?;
     let mut taken: BTreeSet<String> = workspace.folders("crates")?.into_iter().collect();
     taken.extend(["tests", "benches", "config", "pipeline"].map(String::from));
     ensure!(
@@ -145,36 +163,41 @@ const BUILT_IN: &str = "crates/pipeline/src/config/builtin.rs";
 
 /// The files that list all plugins and their configs, with the new one in its place.
 fn lists_with(workspace: &Workspace, name: &str) -> Result<[(&'static str, String); 4]> {
-    let package = format!("tagalong-{name}");
-    let register = format!("    {}::register(registry);", package.replace('-', "_"));
+    let [root, catalog, register, config] = lines_of(name);
     Ok([
-        list_with(workspace, "Cargo.toml", &dependency(name), |line| {
+        list_with(workspace, root, |line| {
             line.starts_with("tagalong-") && line.contains("path = \"plugins/")
         })?,
-        list_with(
-            workspace,
-            "crates/catalog/Cargo.toml",
-            &format!("{package}.workspace = true"),
-            |line| line.starts_with("tagalong-"),
-        )?,
-        list_with(workspace, "crates/catalog/src/lib.rs", &register, |line| {
+        list_with(workspace, catalog, |line| line.starts_with("tagalong-"))?,
+        list_with(workspace, register, |line| {
             line.starts_with("    tagalong_") && line.ends_with("::register(registry);")
         })?,
-        list_with(workspace, BUILT_IN, &format!("    \"{name}\""), |line| {
+        list_with(workspace, config, |line| {
             // The lines of the macro, and none of a list with commas.
             line.starts_with("    \"") && line.ends_with('"')
         })?,
     ])
 }
 
+/// Returns the lists of all plugins and their configs, each with the line of a plugin.
+pub fn lines_of(name: &str) -> [(&'static str, String); 4] {
+    let package = format!("tagalong-{name}");
+    let register = format!("    {}::register(registry);", package.replace('-', "_"));
+    [
+        ("Cargo.toml", dependency(name)),
+        ("crates/catalog/Cargo.toml", format!("{package}.workspace = true")),
+        ("crates/catalog/src/lib.rs", register),
+        (BUILT_IN, format!("    \"{name}\"")),
+    ]
+}
+
 /// A file and its text with one more line among its siblings.
 fn list_with(
     workspace: &Workspace,
-    path: &'static str,
-    line: &str,
+    (path, line): (&'static str, String),
     is_sibling: fn(&str) -> bool,
 ) -> Result<(&'static str, String)> {
-    let text = insert_sorted(&workspace.read(path)?, line, is_sibling);
+    let text = insert_sorted(&workspace.read(path)?, &line, is_sibling);
     Ok((path, text.with_context(|| format!("{path}: no place for the line `{line}`"))?))
 }
 
@@ -212,27 +235,29 @@ fn type_name(name: &str) -> String {
         .collect()
 }
 
+/// Returns a workspace with one plugin, `b`, for tests.
+#[cfg(test)]
+pub fn small_workspace() -> (tempfile::TempDir, Workspace) {
+    let folder = tempfile::tempdir().unwrap();
+    let workspace = Workspace::at(folder.path());
+    let lines = format!("{}\n\n[profile]\n", dependency("b"));
+    workspace.write("Cargo.toml", &lines).unwrap();
+    workspace.write("plugins/b/Cargo.toml", "").unwrap();
+    workspace.write("crates/catalog/Cargo.toml", "tagalong-b.workspace = true\n").unwrap();
+    let register = "fn f() {\n    tagalong_b::register(registry);\n}\n";
+    workspace.write("crates/catalog/src/lib.rs", register).unwrap();
+    let configs = "const BUILT_IN: &[C] = configs! {\n    \"b\"\n};\n";
+    workspace.write(BUILT_IN, configs).unwrap();
+    (folder, workspace)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn workspace() -> (tempfile::TempDir, Workspace) {
-        let folder = tempfile::tempdir().unwrap();
-        let workspace = Workspace::at(folder.path());
-        let lines = format!("{}\n\n[profile]\n", dependency("b"));
-        workspace.write("Cargo.toml", &lines).unwrap();
-        workspace.write("plugins/b/Cargo.toml", "").unwrap();
-        workspace.write("crates/catalog/Cargo.toml", "tagalong-b.workspace = true\n").unwrap();
-        let register = "fn f() {\n    tagalong_b::register(registry);\n}\n";
-        workspace.write("crates/catalog/src/lib.rs", register).unwrap();
-        let configs = "const BUILT_IN: &[C] = configs! {\n    \"b\"\n};\n";
-        workspace.write(BUILT_IN, configs).unwrap();
-        (folder, workspace)
-    }
-
     #[test]
     fn a_new_plugin_is_listed_in_order() {
-        let (_folder, workspace) = workspace();
+        let (_folder, workspace) = small_workspace();
         create(&workspace, Kind::Filter, "a-filter").unwrap();
         create(&workspace, Kind::Detector, "c").unwrap();
         let catalog = workspace.read("crates/catalog/src/lib.rs").unwrap();
@@ -248,7 +273,7 @@ mod tests {
 
     #[test]
     fn no_placeholder_is_left() {
-        let (_folder, workspace) = workspace();
+        let (_folder, workspace) = small_workspace();
         for (kind, name) in Kind::value_variants().iter().zip(["d", "v", "a", "f", "m", "e"]) {
             create(&workspace, *kind, name).unwrap();
             let config = workspace.read(format!("configs/{name}.toml")).unwrap();
@@ -263,7 +288,7 @@ mod tests {
 
     #[test]
     fn bad_and_taken_names_are_refused_and_nothing_is_written() {
-        let (_folder, workspace) = workspace();
+        let (_folder, workspace) = small_workspace();
         for (name, why) in [
             ("Leg", "lower-case"),
             ("a--b", "lower-case"),
@@ -281,7 +306,7 @@ mod tests {
 
     #[test]
     fn a_missing_list_is_an_error_before_anything_is_written() {
-        let (_folder, workspace) = workspace();
+        let (_folder, workspace) = small_workspace();
         workspace.write("crates/catalog/src/lib.rs", "fn f() {}\n").unwrap();
         let error = create(&workspace, Kind::Detector, "c").unwrap_err().to_string();
         assert!(error.contains("crates/catalog/src/lib.rs"), "{error}");

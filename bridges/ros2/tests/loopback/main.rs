@@ -6,6 +6,7 @@
 
 mod faults;
 mod forecast;
+mod lacking;
 mod lidar;
 mod lifecycle;
 mod nav2;
@@ -195,8 +196,11 @@ fn the_robot_moves_while_the_switch_is_held_and_after_a_stop_only_after_a_reset_
     assert!(!commands.moves_since(expired), "the enable was not repeated");
     let zeros = commands.so_far().iter().filter(|(at, _)| *at > expired).count();
     assert!(zeros > 5, "zeros are told: {zeros}");
+    let pressed = Instant::now();
     hand.hold(true);
     commands.wait_for_move("held again");
+    let first_mps = commands.first_speed_since(pressed);
+    assert!(first_mps < 0.15, "from rest, however fast the unheard commands were: {first_mps}");
 
     hand.switch_off();
     sleep(Duration::from_millis(200));

@@ -50,8 +50,8 @@ pub(crate) const LAST_MOVE_S: f64 = 0.5 + 0.04 + 0.2;
 
 /// Returns a domain that no other run of this test is likely to use.
 pub(crate) fn domain(offset: u32) -> u16 {
-    // Seventeen domains per process, below the limit of 232.
-    (100 + 17 * (std::process::id() % 7) + offset) as u16
+    // Eighteen domains per process, below the limit of 232.
+    (100 + 18 * (std::process::id() % 7) + offset) as u16
 }
 
 /// Returns a guard for a test that runs alone, or `None` where participants do not hear each other.
@@ -298,6 +298,17 @@ impl<C: Command> Collected<C> {
     /// Returns true if a command since then moves the robot.
     pub(crate) fn moves_since(&self, then: Instant) -> bool {
         self.so_far().iter().any(|(at, command)| *at > then && speeds(command) != [0.0, 0.0])
+    }
+
+    /// Returns the speed ahead of the first command since then that moves the robot, m/s; 0 without
+    /// one.
+    pub(crate) fn first_speed_since(&self, then: Instant) -> f64 {
+        for (at, command) in self.so_far() {
+            if at > then && speeds(&command) != [0.0, 0.0] {
+                return command.twist().linear.x;
+            }
+        }
+        0.0
     }
 
     /// Waits until a command moves the robot.

@@ -102,7 +102,7 @@ struct Contestant {
     settings: Vec<(Vec<toml::Value>, Contender)>,
     /// Number of settings among which the sequences choose.
     candidates: usize,
-    /// How they were searched.
+    /// Method of the search.
     search: Search,
     /// Index of the settings of the config, which are a candidate only by chance.
     shipped: usize,

@@ -32,7 +32,7 @@ pub struct Contestant {
     /// For each seed its sample, as indices into `settings`; a single sample if it does not depend
     /// on a seed.
     pub samples: Vec<Vec<usize>>,
-    /// How they were searched.
+    /// Method of the search.
     pub search: Search,
     /// Index of the settings of the config, which are a candidate only by chance.
     pub shipped: usize,

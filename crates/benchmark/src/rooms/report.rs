@@ -42,7 +42,7 @@ struct About {
 #[derive(Default, Serialize)]
 pub struct Fitted {
     pub name: String,
-    /// How settings were searched.
+    /// Method of the search for settings.
     search: Search,
     /// Number of settings among which the rooms chose.
     settings: usize,

@@ -47,10 +47,10 @@ pub(super) fn choose(
 }
 
 /// Returns the line about the config that joins a network with depth. Only networks with figures on
-/// recorded logs are said to find more.
+/// recorded logs are said to have found more.
 fn joined_line(joined: &str, has_figures: bool) -> String {
     let gain = if has_figures {
-        "finds more people, but confuses more of them in a crowd"
+        "found more people in the annotated rooms, but confused more of them in a crowd"
     } else {
         "joins your network with depth"
     };
@@ -69,7 +69,7 @@ mod tests {
         let known = joined_line("yolox-nano-depth", true);
         assert!(
             known.starts_with(
-                "`tagalong run yolox-nano-depth LOG` finds more people, but confuses more"
+                "`tagalong run yolox-nano-depth LOG` found more people in the annotated rooms, but"
             ),
             "{known}"
         );

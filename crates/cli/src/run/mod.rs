@@ -5,6 +5,7 @@ mod choice;
 mod each_camera;
 mod frames;
 mod images;
+mod lacking;
 mod pace;
 mod pictures;
 mod report;
@@ -17,6 +18,7 @@ use std::time::Instant;
 
 pub use args::{Overlaid, RunArgs};
 use frames::{Frames, Item};
+use lacking::Lacking;
 use pace::Pace;
 use pictures::Pictures;
 use report::{FileFacts, RunReport, Tally};
@@ -40,7 +42,7 @@ use tagalong_app::unable::unable;
 use tagalong_config::Registry;
 use tagalong_core::Stamp;
 use tagalong_log::write::{FrameNames, FrameRecord, RunDir, RunTexts, TrackLog};
-use tagalong_log::{FrameSource, Input, Inputs, Usage};
+use tagalong_log::{FrameSource, Input, Inputs, Usage, is_loss};
 use tagalong_pipeline::{FrameReport, MissingSource, Pipeline, ResolvedConfig, StepError};
 use tagalong_render::{Overlay, OverlayData, background};
 use tagalong_simulate::sample;
@@ -49,8 +51,8 @@ use tagalong_view::Live;
 /// Runs a pipeline over a log, until a signal comes.
 ///
 /// # Errors
-/// A config, log or output directory that cannot be used; a plugin that fails on a frame; a disk
-/// that fails.
+/// A config, log or output directory that cannot be used; a plugin that fails on a frame; frames that
+/// all lack an input; a disk that fails.
 pub fn run(args: &RunArgs, registry: &Registry) -> Outcome {
     if args.each_camera {
         return each_camera::run(args, registry);
@@ -251,8 +253,8 @@ struct Stage<'a> {
     live: Option<&'a Live>,
 }
 
-/// Processes one frame after the other until the log ends, the pipeline fails or a signal comes.
-/// `Some` is the error of the plugin that ended it.
+/// Processes one frame after the other until the log ends, the pipeline fails or a signal comes; a
+/// frame that lacks an input is left out. `Some` is the error of the plugin that ended it.
 fn work(
     pipeline: &mut Pipeline,
     frames: &mut Frames,
@@ -270,7 +272,10 @@ fn work(
         desk.tally.read(item.frame.odom_stale);
         let report = match pipeline.step(&item.frame.frame) {
             Ok(report) => report,
-            Err(error) => return Ok(Some(error)),
+            Err(error) => match desk.lacking.count(error) {
+                Ok(()) => continue,
+                Err(error) => return Ok(Some(error)),
+            },
         };
         let people = report.tracks.iter().filter(|track| track.confirmed && track.seen).count();
         progress.show(item.progress, report.index, people);
@@ -299,6 +304,7 @@ struct Desk {
     log: TrackLog,
     overlay: Option<Overlay>,
     tally: Tally,
+    lacking: Lacking,
     timings: Timings,
     /// Times from one frame of the log to the next.
     periods: Timings,
@@ -336,6 +342,7 @@ impl Desk {
             log,
             overlay,
             tally,
+            lacking: Lacking::default(),
             timings,
             periods: Timings::default(),
             last: None,
@@ -395,10 +402,16 @@ impl Desk {
         args: &RunArgs,
         mut report: RunReport,
         source: Option<FrameSource>,
-        stopped: Option<StepError>,
+        mut stopped: Option<StepError>,
         signals: &Signals,
     ) -> Outcome {
         self.tally.fill(&mut report);
+        // A pipeline that processed no frame for want of an input has failed.
+        if report.frames.processed == 0 && signals.received().is_none() {
+            stopped = stopped.or(self.lacking.first_error());
+        }
+        report.lacking = self.lacking.into_groups();
+        report.frames.lacking = report.lacking.iter().map(|group| group.frames).sum();
         describe_source(&mut report, source);
         describe_end(&mut report, stopped.as_ref(), signals);
         // Without a single processed frame the output would be an empty directory that looks like a
@@ -455,19 +468,9 @@ fn about(report: &RunReport) -> BTreeMap<String, String> {
     ])
 }
 
-/// Counters of the reader that are no reason for a missing frame.
-const NO_REASON: [&str; 6] = [
-    "chunks_verified",
-    "chunks_without_crc",
-    "messages",
-    "messages_unpacked",
-    "disparity_pixels",
-    "disparity_pixels_invalid",
-];
-
 /// Returns the message about a log of which no frame could be made.
 fn no_frame(report: &RunReport, args: &RunArgs) -> String {
-    let telling = report.counters.iter().filter(|(name, _)| !NO_REASON.contains(&name.as_str()));
+    let telling = report.counters.iter().filter(|(name, _)| is_loss(name));
     let reasons: Vec<String> =
         telling.map(|(name, count)| format!("{} {count}", name.replace('_', " "))).collect();
     let why =
@@ -486,6 +489,11 @@ fn verdict(
 ) -> Outcome {
     for note in &report.notes {
         say(&format!("note: {note}"));
+    }
+    if report.frames.processed > 0 {
+        for group in &report.lacking {
+            say(&format!("warning: {}", group.warning(report.frames.read)));
+        }
     }
     match stopped {
         // The error is the plugin's, and the results before it are written.

@@ -5,6 +5,8 @@ use tagalong_core::Funnel;
 use tagalong_log::InputAccount;
 use tagalong_pipeline::{Fate, FrameReport, Outcome};
 
+use super::lacking::LackingFrames;
+
 /// `report.json`: results of a run, and its dropped candidates with the reasons. Two runs of the
 /// same log, config and seed give the same bytes.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -23,6 +25,8 @@ pub struct RunReport {
     pub data_lost: bool,
     /// Frames by their outcome.
     pub frames: Frames,
+    /// Frames that lack a required input, by plugin and input.
+    pub lacking: Vec<LackingFrames>,
     /// Persons that were confirmed, by number.
     pub persons: BTreeMap<u32, PersonFacts>,
     /// Candidates by their fate.
@@ -59,6 +63,8 @@ pub struct Frames {
     pub duplicate: u64,
     /// Frames older than the one before: dropped.
     pub out_of_order: u64,
+    /// Frames without an input that a plugin requires: left out.
+    pub lacking: u64,
     /// Pauses after which tentative tracks ended.
     pub gaps: u64,
     /// Clock jumps back, after which all tracks ended.

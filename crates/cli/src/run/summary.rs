@@ -3,7 +3,7 @@ use std::path::Path;
 
 use clap::ValueEnum;
 use tagalong_app::timings::{Timings, WHOLE_FRAME, too_slow};
-use tagalong_log::Input;
+use tagalong_log::{Input, is_loss};
 use tagalong_math::counted;
 
 use super::args::RunArgs;
@@ -20,9 +20,6 @@ const IMAGES: [Input; 3] = [Input::Colour, Input::Depth, Input::Right];
 
 /// Stages whose times are shown beside those of whole frames.
 const STAGE_LINES: usize = 3;
-
-/// Counters of read items, as opposed to lost ones.
-const NO_LOSS: [&str; 3] = ["chunks_verified", "frames", "messages"];
 
 /// Returns the results of a run, for a terminal.
 pub fn text(
@@ -141,7 +138,7 @@ fn times(out: &mut String, timings: &Timings, period_ms: Option<f64>, args: &Run
         let log = quoted(&args.log().display().to_string());
         let _ = writeln!(
             out,
-            "  {slow};\n  `tagalong doctor {log}` prints the time of each pipeline; a network can \
+            "  {slow};\n  `tagalong doctor {log}` prints the time of each pipeline; a detector can \
              run in every Nth frame only (`every = N` beside its `plugin`)"
         );
     }
@@ -152,7 +149,7 @@ fn losses(out: &mut String, report: &RunReport) {
         return;
     }
     let _ = writeln!(out, "part of the log was lost or could not be used:");
-    for (name, count) in report.counters.iter().filter(|(name, _)| !NO_LOSS.contains(&&***name)) {
+    for (name, count) in report.counters.iter().filter(|(name, _)| is_loss(name)) {
         let _ = writeln!(out, "  {name} {count}");
     }
 }
@@ -180,7 +177,20 @@ fn files(out: &mut String, folder: &Path, has_images: bool, overlay: bool) {
 
 #[cfg(test)]
 mod tests {
-    use super::quoted;
+    use std::collections::BTreeMap;
+
+    use super::super::report::RunReport;
+    use super::{losses, quoted};
+
+    #[test]
+    fn counters_of_what_was_read_are_no_losses() {
+        let counters = ["chunks_without_crc", "depth_registered", "truncated"];
+        let counters: BTreeMap<String, u64> = counters.map(|name| (name.to_owned(), 2)).into();
+        let report = RunReport { data_lost: true, counters, ..RunReport::default() };
+        let mut out = String::new();
+        losses(&mut out, &report);
+        assert_eq!(out, "part of the log was lost or could not be used:\n  truncated 2\n");
+    }
 
     #[test]
     fn a_printed_path_is_one_word_of_a_shell() {

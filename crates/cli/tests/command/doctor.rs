@@ -234,10 +234,34 @@ fn what_was_broken_is_found() {
     assert!(missed.is_empty(), "{}", missed.join("\n"));
 }
 
+/// Of outlines and shapes that depth does not show, nothing is concluded where depth itself is in doubt.
+#[test]
+fn from_depth_in_doubt_nothing_is_concluded() {
+    let home = tempfile::tempdir().unwrap();
+    let log = home.path().join("doubtful.mcap");
+    let other_clock = with_depth_stamp(|_, at| at + 600_000_000_000);
+    let mono = root().join("configs/mono.toml");
+    for (changes, config, ids, why) in [
+        (scaled(100.0), config(), &["missed"][..], "the unit of depth is in doubt"),
+        (scaled(0.0), config(), &["registration"], "depth has no reading"),
+        (other_clock, mono, &["registration"], "the depth is not used"),
+    ] {
+        broken::write(good(), &log, &changes);
+        let (_, said) = doctor(&config, &log, &["--frames", "24", "--settings", "never"]);
+        for id in ids {
+            let measured = finding(&said, id)["measured"].as_str().unwrap();
+            assert_eq!(measured, format!("not known: {why}"), "{id}");
+        }
+    }
+}
+
 #[test]
 fn a_good_log_is_let_go() {
     let (code, said) = doctor(&config(), good(), &[]);
     assert_eq!((code, complaints(&said)), (0, Vec::new()), "{said:#}");
+    // Of topics that are not used, nothing is said.
+    let skipped = finding(&said, "skipped");
+    assert_eq!(skipped["measured"], "no message of the topics used was left out");
     let output = tagalong().arg("doctor").arg(config()).arg(good()).output().unwrap();
     let printed = text(&output.stdout);
     assert!(printed.contains("no problem found"), "{printed}");
@@ -399,7 +423,7 @@ fn without_a_config_each_pipeline_that_fits_is_tried() {
     assert!(printed.contains("`tagalong run` takes depth-verified, because"), "{printed}");
     let network = said["network"].as_str().unwrap();
     assert!(network.contains("`tagalong model --install FILE.onnx` installs one"), "{network}");
-    assert!(printed.contains(&format!("  network: {network}\n")), "{printed}");
+    assert!(printed.contains(&format!("  no network is among them: {network}\n")), "{printed}");
 }
 
 /// Every setting that is tried differs from the present one.
@@ -496,6 +520,13 @@ fn images_that_make_no_frames_are_told() {
     assert_eq!((code, read["severity"].as_str()), (3, Some("bad")), "{said:#}");
     let measured = read["measured"].as_str().unwrap();
     assert!(measured.contains("0 frames of 32 images; colour without depth 32"), "{measured}");
+    assert!(!measured.contains("chunks"), "{measured}");
+    let told = read["remedy"].as_str().unwrap();
+    assert!(
+        told.contains("32 of 32 frames got no image of ") && told.contains(": none of"),
+        "{told}"
+    );
+    assert!(!told.contains("pose of the camera"), "what is no loss: {told}");
     assert!(!said["findings"].as_array().unwrap().iter().any(|f| f["id"] == "missed"), "{said:#}");
 }
 

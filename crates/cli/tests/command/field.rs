@@ -161,6 +161,7 @@ fn detections_that_are_slower_than_the_images_are_tracked() {
     let Some(log) = field("detections-slower-than-images/every-third.mcap") else { return };
     let ran = run(&recorded(""), &log, &[]);
     assert_eq!((ran.code, ran.persons(), ran.frames()), (0, 1, 20), "{}", ran.said);
+    ran.says(&["note: /detections has messages for 6 of 20 images: tracks are predicted"]);
     // A message comes with every third image, and between two of them the person is predicted.
     let places = ran.rows("tracks-metres.csv");
     let seen: Vec<f64> = places.iter().filter(|row| row[SEEN] > 0.0).map(|row| row[1]).collect();

@@ -257,7 +257,7 @@ fn what_is_not_of_the_layout_is_told() {
         (&["tum", "empty"], 1, "TUM RGB-D"),
         (&["kitti", "empty"], 1, "KITTI"),
         (&["mot", "empty"], 1, "MOTChallenge"),
-        (&["mot", "bare"], 1, "`tagalong boxes FOLDER_OF_SEQUENCES`"),
+        (&["mot", "bare"], 1, "without them; --boxes DIR names the folder of the boxes"),
         (&["images", "empty"], 1, "no images"),
         (&["images", "nowhere"], 1, "no such file"),
         (&["images", "a.bag"], 1, "is a file"),

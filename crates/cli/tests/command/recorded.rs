@@ -60,3 +60,47 @@ fn a_log_without_boxes_is_refused_with_the_name_of_the_topic() {
     let told = messages_of(&output.output().unwrap(), 2);
     assert!(told.contains("/detections") && told.contains("detections_topic"), "{told}");
 }
+
+/// Runs over a log in a folder of its own.
+fn run(log: &Drawn, folder: &Path) -> std::process::Output {
+    log.write(&folder.join("walk.mcap"));
+    let mut run = tagalong();
+    run.current_dir(folder).arg("run").arg(shipped()).args(["walk.mcap", "-o", "out"]);
+    run.output().unwrap()
+}
+
+/// The other program starts late, or pauses: the tracks go on with its next message.
+#[test]
+fn frames_without_a_message_are_left_out_and_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = Drawn { boxes: true, silent: 3..6, ..Drawn::of(20) };
+    let told = messages_of(&run(&log, folder.path()), 0);
+    let warning = "warning: 3 of 20 frames left out, the first is frame 4: they lack recorded detections, \
+                   which `recorded-detections` needs\n";
+    assert!(told.contains(warning) && told.matches("warning").count() == 1, "{told}");
+    let report = fs::read(folder.path().join("out/report.json")).unwrap();
+    let report: Value = serde_json::from_slice(&report).unwrap();
+    let frames = &report["frames"];
+    assert_eq!(
+        [&frames["read"], &frames["processed"], &frames["lacking"]],
+        [20, 17, 3],
+        "{frames}"
+    );
+    let lacking = serde_json::json!([{
+        "plugin": "recorded-detections", "input": "detections", "first_frame": 4, "frames": 3
+    }]);
+    assert_eq!(report["lacking"], lacking);
+    assert_eq!(report["ended"], "complete");
+    assert_eq!(report["data_lost"], false);
+    assert_eq!(report["persons"]["1"]["last_frame"], 20, "{}", report["persons"]);
+}
+
+#[test]
+fn a_log_in_which_no_frame_has_a_message_fails() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = Drawn { boxes: true, silent: 0..20, ..Drawn::of(20) };
+    let told = messages_of(&run(&log, folder.path()), 1);
+    let error = "error: frame 1: `recorded-detections` needs recorded detections, which this frame does not have";
+    assert!(told.contains(error) && !told.contains("warning"), "{told}");
+    assert!(!folder.path().join("out").exists(), "no results");
+}

@@ -12,12 +12,13 @@ use super::super::depth_unit::{JudgedDepth, Unit};
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
-/// Usual median of the depth readings of a robot's camera, m.
+/// Usual range of the median of the depth readings of a robot's camera, m.
 const PLAUSIBLE_M: std::ops::RangeInclusive<f64> = 0.6..=15.0;
-/// Median of the depth readings of a camera in any room, or in front of anything, m.
+/// Plausible range of the median of the depth readings of a camera in any room, or in front of any
+/// object, m.
 const POSSIBLE_M: std::ops::RangeInclusive<f64> = 0.1..=60.0;
 
-/// Checks unit, scale, holes and steps of depth.
+/// Checks the unit, scale, holes and steps of depth.
 pub fn depth(evidence: &Evidence) -> Option<Finding> {
     evidence.inspection.facts.depth_topic.as_ref()?;
     let images = &evidence.samples.depths;
@@ -85,10 +86,21 @@ pub fn depth(evidence: &Evidence) -> Option<Finding> {
     })
 }
 
-/// Returns the judgement of depth; `None` where no pixel has a reading. Several checks need it, and the
-/// fits of the floor behind it are slow, so it is made once.
+/// Returns the assessment of depth; `None` if no pixel has a reading. It is made once, because
+/// several checks need it and its fits of the floor are slow.
 fn judged(evidence: &Evidence) -> Option<&JudgedDepth> {
     evidence.depth.get_or_init(|| judge(evidence)).as_ref()
+}
+
+/// Returns the reason for which depth without outlines and shapes tells nothing; `None` where it is used, in
+/// a unit that nothing speaks against.
+pub fn doubt(evidence: &Evidence) -> Option<&'static str> {
+    if evidence.samples.depths.is_empty() {
+        return Some("not known: the depth is not used");
+    }
+    let Some(judged) = judged(evidence) else { return Some("not known: depth has no reading") };
+    let is_doubtful = judged.unit.severity() >= Severity::Warn;
+    is_doubtful.then_some("not known: the unit of depth is in doubt")
 }
 
 fn judge(evidence: &Evidence) -> Option<JudgedDepth> {
@@ -98,7 +110,7 @@ fn judge(evidence: &Evidence) -> Option<JudgedDepth> {
     Some(JudgedDepth { quality, measured_factor: factor, unit })
 }
 
-/// Judges the unit by the floor, and where none is seen by the median of the readings.
+/// Assesses the unit by the floor, or by the median of the readings if no floor is visible.
 fn unit_by(evidence: &Evidence, quality: &DepthQuality, measured_factor: Option<f64>) -> Unit {
     if let Some(factor) = measured_factor {
         return Unit::by_factor(factor);
@@ -120,7 +132,7 @@ fn unit_by(evidence: &Evidence, quality: &DepthQuality, measured_factor: Option<
     }
 }
 
-/// Returns true if depth comes from disparities.
+/// Returns true if depth is computed from disparities.
 fn is_disparity(evidence: &Evidence) -> bool {
     evidence.inspection.counters.contains_key("disparity_pixels")
 }
@@ -135,7 +147,7 @@ fn better_geometry(median_m: f64) -> String {
     )
 }
 
-/// Returns true if something else than depth tells the height of the camera, and it is a robot's.
+/// Returns true if the height of the camera is known without depth, and is plausible for a robot.
 fn is_height_known(evidence: &Evidence) -> bool {
     let source = &evidence.inspection.facts.camera_source;
     let camera = evidence.samples.camera.as_ref();
@@ -144,8 +156,9 @@ fn is_height_known(evidence: &Evidence) -> bool {
         && camera.is_some_and(|camera| ROBOT_HEIGHTS_M.contains(&camera.height_m()))
 }
 
-/// Returns the factor by which depth has to be multiplied for the floor to lie as far below the camera
-/// as its mount says; `None` where the mount is not known, or too little floor is seen.
+/// Returns the factor by which depth has to be multiplied so that the distance of the floor below
+/// the camera agrees with its mount; `None` if the mount is unknown, or too little floor is
+/// visible.
 fn measured_factor(evidence: &Evidence) -> Option<f64> {
     if !is_height_known(evidence) {
         return None;
@@ -157,17 +170,17 @@ fn measured_factor(evidence: &Evidence) -> Option<f64> {
     factors.get(factors.len() / 2).copied()
 }
 
-/// Returns the unit that is taken, m.
+/// Returns the unit in use, m.
 fn taken_unit_m(evidence: &Evidence) -> f64 {
     let usual = if is_float(evidence) { 1.0 } else { 0.001 };
     evidence.input.depth_unit_m.unwrap_or(usual)
 }
 
-/// Units that depth cameras have, m.
+/// Units of depth cameras, m.
 const USUAL_UNITS_M: [f64; 8] = [1.0, 0.01, 0.001, 0.0005, 0.00025, 0.0002, 0.000125, 0.0001];
 
-/// Returns the remedy where the floor lies so with the unit that is taken, m, and the height of the
-/// camera is not known: each unit with the height that follows from it.
+/// Returns the remedy for a distance of the floor with the unit in use, m, if the height of the
+/// camera is unknown: each possible unit with the height that follows from it.
 fn units_by_height(taken_m: f64, floor: &Ground) -> String {
     let height_m = floor.height_m;
     let mut follows: Vec<String> = Vec::new();
@@ -191,8 +204,8 @@ fn units_by_height(taken_m: f64, floor: &Ground) -> String {
     )
 }
 
-/// Returns the remedy where the readings are those of no room and no floor is seen: the power of ten by
-/// which they are some metres.
+/// Returns the remedy for implausible readings without a visible floor: the power of ten with which
+/// they become a few metres.
 fn unit_by_median(taken_m: f64, median_m: f64) -> String {
     let tens = (USUAL_MEDIAN_M / median_m).log10().round();
     let better = written_unit_m(taken_m * 10f64.powf(tens));
@@ -203,11 +216,11 @@ fn unit_by_median(taken_m: f64, median_m: f64) -> String {
     )
 }
 
-/// Remedy where nothing tells the unit.
+/// Remedy if the unit cannot be determined.
 const UNIT_BY_THING: &str = "is the scene really this near or this far? if not, set [input] \
      depth_unit_m, in metres per unit; no floor is visible from which it would follow";
 
-/// Returns true for depth in floating-point numbers, which are metres by convention.
+/// Returns true for depth in floating-point numbers, which is in metres by convention.
 fn is_float(evidence: &Evidence) -> bool {
     let topic = evidence.inspection.facts.depth_topic.as_ref();
     let image = topic.and_then(|t| evidence.inspection.topic(t)).and_then(|t| t.image.as_ref());
@@ -216,10 +229,10 @@ fn is_float(evidence: &Evidence) -> bool {
 
 /// Median of the depth readings of a robot's camera, m.
 const USUAL_MEDIAN_M: f64 = 3.0;
-/// Number of depth images by which the floor is measured.
+/// Number of depth images in which the floor is measured.
 const FLOOR_IMAGES: usize = 3;
 
-/// Returns the floor below the camera; `None` if none is seen.
+/// Returns the floor below the camera; `None` if none is visible.
 fn floor_of(depths: &[Arc<DepthImage>], camera: &Camera, median_m: f64) -> Option<Ground> {
     // The fit has tolerances in metres, and needs readings of usual size.
     let scale = USUAL_MEDIAN_M / median_m;
@@ -235,8 +248,8 @@ fn floor_of(depths: &[Arc<DepthImage>], camera: &Camera, median_m: f64) -> Optio
     floors.get(floors.len() / 2).copied()
 }
 
-/// Returns true if the unit of depth may be wrong: the readings tell it, or nobody is found and no floor
-/// lies where that of a robot does, with a camera whose height nothing else tells.
+/// Returns true if the unit of depth may be wrong: either the readings indicate it, or no person is
+/// found, the height of the camera is unknown, and no floor is at a plausible distance for a robot.
 pub(super) fn is_unit_in_doubt(evidence: &Evidence) -> bool {
     let samples = &evidence.samples;
     if judged(evidence).is_some_and(|judged| judged.unit.severity() > Severity::Ok) {

@@ -1,7 +1,7 @@
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
-/// Share of black, or of white, above which an image is useless.
+/// Share of black or of white pixels above which an image is useless.
 const BLIND: f64 = 0.9;
 
 /// Checks the exposure.

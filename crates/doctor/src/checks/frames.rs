@@ -6,7 +6,7 @@ use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 use super::pose::mount_lines;
 
-/// Checks that the frames of tf are connected, and that the camera's is an optical one.
+/// Checks that the frames of tf are connected, and that the frame of the camera is an optical one.
 pub fn frames(evidence: &Evidence) -> Option<Finding> {
     fn ok(measured: String) -> Option<Finding> {
         Some(Finding::new("frames", Severity::Ok, measured))
@@ -32,7 +32,7 @@ pub fn frames(evidence: &Evidence) -> Option<Finding> {
     }
     let pitch = camera.pitch_down_rad().to_degrees();
     let roll = camera.roll_rad().to_degrees();
-    // A body frame in place of the optical one turns the camera by 90 degrees, far beyond these
+    // A body frame instead of the optical one turns the camera by 90 degrees, far beyond these
     // limits.
     let upright = pitch.abs() <= 65.0 && roll.abs() <= 45.0;
     if upright || camera.panorama().is_some() {
@@ -51,7 +51,7 @@ pub fn frames(evidence: &Evidence) -> Option<Finding> {
     )))
 }
 
-/// Reports that the scanner's frame is not connected to the robot's.
+/// Reports that the frame of the scanner is not connected to that of the robot.
 fn cut_scanner(evidence: &Evidence, scanner: &str) -> Finding {
     let facts = &evidence.inspection.facts;
     let robot = facts.robot_frame.as_str();
@@ -66,7 +66,7 @@ fn cut_scanner(evidence: &Evidence, scanner: &str) -> Finding {
         .remedy(remedy)
 }
 
-/// Reports that the camera's frame is not connected to the robot's.
+/// Reports that the frame of the camera is not connected to that of the robot.
 fn cut(evidence: &Evidence, camera: &str) -> Finding {
     let facts = &evidence.inspection.facts;
     let tf = &evidence.inspection.transforms;
@@ -98,7 +98,7 @@ fn cut(evidence: &Evidence, camera: &str) -> Finding {
         .remedy(remedy)
 }
 
-/// Returns the topmost frame above one.
+/// Returns the root of the tree that contains a frame.
 fn root_of(evidence: &Evidence, frame: &str) -> Option<String> {
     let tf = &evidence.inspection.transforms;
     let mut at = frame;

@@ -9,20 +9,21 @@ use super::super::finding::{Finding, Severity};
 /// Height of the top of a head, m.
 const TOP_M: f64 = 1.75;
 
-/// Distances that are tried, m, and their number.
+/// Range of the distances that are tried, m, and their number.
 const NEAREST_M: f64 = 0.3;
 const STEP_M: f64 = 0.05;
 const STEPS: usize = 155;
 
-/// Distance up to which people are wanted whole, m, and beyond which nobody misses them.
+/// Distance up to which people should be fully visible, m, and distance beyond which they are not
+/// needed.
 const NEAR_M: f64 = 1.5;
 const BAD_NEAR_M: f64 = 2.5;
 const FAR_M: f64 = 4.0;
 
-/// Checks at which distances heads are in the image, by height, pitch and lens.
+/// Checks at which distances heads are in the image, from the height, pitch and lens of the camera.
 pub fn heads(evidence: &Evidence) -> Option<Finding> {
     let camera = evidence.samples.camera.as_ref()?;
-    // A mirror looks all around, and a height that is unknown tells nothing.
+    // A mirror sees all around, and an unknown height gives no information.
     if camera.panorama().is_some() || camera.is_blind() || camera.height_m() <= 0.0 {
         return None;
     }
@@ -65,8 +66,8 @@ pub fn heads(evidence: &Evidence) -> Option<Finding> {
 
 const WHY: &str = "most detectors look for heads; only trunk and legs of nearer people are visible";
 
-/// Returns the distances straight ahead from which the whole of a head is in the image, m; `None` if
-/// there are none.
+/// Returns the distances straight ahead at which the whole head is in the image, m; `None` if there
+/// are none.
 fn head_range(camera: &Camera) -> Option<RangeInclusive<f64>> {
     let eye = camera.robot_from_camera.translation.vector;
     let ahead = (camera.robot_from_camera.rotation * nalgebra::Vector3::z()).xy();
@@ -83,7 +84,8 @@ fn head_range(camera: &Camera) -> Option<RangeInclusive<f64>> {
     Some(*visible.first()?..=*visible.last()?)
 }
 
-/// Returns the angle by which the camera would have to look up, and the detector that needs no head.
+/// Returns the advice: the angle by which the camera would have to look up, and a detector that
+/// needs no head.
 fn remedy(camera: &Camera) -> String {
     let wanted = (TOP_M - camera.height_m()).atan2(NEAR_M);
     let top = camera.ray(nalgebra::Point2::new(0.5 * camera.width as f64, 0.0));

@@ -45,7 +45,7 @@ pub fn intrinsics(evidence: &Evidence) -> Option<Finding> {
     ))
 }
 
-/// A finding on the intrinsics, with what they decide.
+/// Returns a finding on the intrinsics, with their effect.
 fn about_lens(severity: Severity, measured: String) -> Finding {
     Finding::new("intrinsics", severity, measured)
         .why("sizes and positions in metres follow from the focal length")

@@ -1,21 +1,28 @@
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
+use super::depth::doubt;
 use super::odometry::{Motion, motion};
 use super::{Alternative, better};
 
-/// Blobs below which shares mean little.
+/// Number of blobs below which shares are not significant.
 const FEW_BLOBS: usize = 3;
 
-/// Checks that shapes of the size of people that come and go have tracks.
+/// Checks that person-sized shapes that come and go have tracks.
 pub fn missed(evidence: &Evidence) -> Option<Finding> {
     let coverage = &evidence.coverage;
-    evidence.changed?;
+    if !coverage.has_depth {
+        return None;
+    }
     // Without a run there is nothing to compare with.
     if evidence.trial.frames == 0 || evidence.trial.failure.is_some() {
         return None;
     }
     if coverage.blobs == 0 {
-        let measured = "no shape of a person's size comes or goes in depth";
+        let measured = match (doubt(evidence), evidence.changed) {
+            (Some(doubt), _) => doubt,
+            (None, Some(_)) => "no shape of a person's size comes or goes in depth",
+            (None, None) => "not known: too few views of depth show the same places",
+        };
         return Some(Finding::new("missed", Severity::Unknown, measured));
     }
     let share = coverage.unexplained as f64 / coverage.blobs as f64;
@@ -60,7 +67,7 @@ pub fn missed(evidence: &Evidence) -> Option<Finding> {
     Some(finding.remedy(remedy(evidence)))
 }
 
-/// Returns the change that helped most on this log, else a general one.
+/// Returns the change that helped most on this log, or else general advice.
 fn remedy(evidence: &Evidence) -> String {
     if motion(evidence) == Motion::Likely {
         return "see the finding odometry first".to_owned();

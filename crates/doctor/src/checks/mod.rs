@@ -1,5 +1,5 @@
-//! One file for each possible problem. `None`: the log lacks the data to check, for
-//! example depth.
+//! One module for each possible problem. A check returns `None` if the log lacks the data for it,
+//! for example depth.
 
 mod damage;
 mod depth;
@@ -30,11 +30,19 @@ use super::coverage::{Alternative, Coverage};
 use super::evidence::Evidence;
 use super::finding::{Finding, Severity};
 
-/// Function that checks one aspect.
-pub type Check = fn(&Evidence) -> Option<Finding>;
+/// Function of one check.
+type Check = fn(&Evidence) -> Option<Finding>;
 
-/// All checks, causes before their consequences.
-pub const ALL: &[Check] = &[
+/// Runs all checks, and returns their findings, causes before their consequences.
+pub fn findings(evidence: &Evidence) -> Vec<Finding> {
+    let mut found: Vec<Finding> = BEFORE_LASER.iter().filter_map(|check| check(evidence)).collect();
+    found.extend(laser::scanners(evidence));
+    found.extend(BEHIND_LASER.iter().filter_map(|check| check(evidence)));
+    found
+}
+
+/// Checks before those of the scanners, of which there are as many as scanners.
+const BEFORE_LASER: &[Check] = &[
     needs::needs,
     topics::topics,
     damage::damage,
@@ -52,16 +60,14 @@ pub const ALL: &[Check] = &[
     mount::mount,
     heads::heads,
     suits::suits,
-    laser::laser,
-    odometry::odometry,
-    preparation::preparation,
-    people::people,
-    still::still,
-    missed::missed,
 ];
 
-/// Returns true if tracks and things that come and go do not agree, so that other settings should
-/// be tried.
+/// Checks behind those of the scanners.
+const BEHIND_LASER: &[Check] =
+    &[odometry::odometry, preparation::preparation, people::people, still::still, missed::missed];
+
+/// Returns true if tracks disagree with shapes that come and go, so that other settings should be
+/// tried.
 pub fn asks_for_settings(evidence: &Evidence) -> bool {
     let asking = [still::still(evidence), missed::missed(evidence)];
     asking.iter().flatten().any(|finding| finding.severity >= Severity::Warn)
@@ -70,8 +76,8 @@ pub fn asks_for_settings(evidence: &Evidence) -> bool {
 /// Gain of a setting below which it is not recommended.
 const MIN_GAIN: f64 = 0.02;
 
-/// Returns the best other setting that was tried on this log, if it is better than the present one
-/// and fulfils a condition.
+/// Returns the best alternative that was tried on this log, if it is better than the present
+/// setting and satisfies a condition.
 fn better(evidence: &Evidence, fits: impl Fn(&Coverage) -> bool) -> Option<&Alternative> {
     let now = evidence.coverage.worth();
     // The best comes first.

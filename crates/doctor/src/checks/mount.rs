@@ -41,7 +41,7 @@ pub fn mount(evidence: &Evidence) -> Option<Finding> {
         .figure("pitch_off_deg", pitch)
         .figure("roll_off_deg", roll)
         .why("heads are looked for at the height of heads above the floor");
-    // A wrong unit of depth scales the height and leaves the angles as they are.
+    // A wrong unit of depth scales the height, but not the angles.
     let scaled = pitch.abs() < 3.0
         && roll.abs() < 3.0
         && ROBOT_HEIGHTS_M.contains(&told)

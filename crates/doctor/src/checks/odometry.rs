@@ -1,10 +1,10 @@
 use tagalong_math::counted;
 
-use super::super::evidence::Evidence;
+use super::super::evidence::{Evidence, Scans};
 use super::super::finding::{Finding, Severity};
 use super::depth::is_unit_in_doubt;
 
-/// Way below which a robot stands, m: noise of the odometry adds up.
+/// Distance below which a robot counts as at rest, m, because noise of the odometry adds up.
 const STANDS_M: f64 = 0.3;
 
 /// Share of points, or of rays, that come and go beyond which the camera, or the scanner, itself moves.
@@ -13,7 +13,7 @@ const ALL_MOVES: f64 = 0.5;
 /// Share of points, or of rays, up to which people explain them.
 const FEW_MOVE: f64 = 0.1;
 
-/// Checks that the robot's motion is known.
+/// Checks that the motion of the robot is known.
 pub fn odometry(evidence: &Evidence) -> Option<Finding> {
     let counters = &evidence.inspection.counters;
     let [gaps, jumps] = ["odometry_gap_frames", "odometry_jump_frames"]
@@ -32,7 +32,7 @@ pub fn odometry(evidence: &Evidence) -> Option<Finding> {
     let source = evidence.inspection.facts.odometry_topic.as_deref();
     let (severity, measured) = match (source, gaps + jumps) {
         (_, 1..) => (Severity::Warn, unsteady(gaps, jumps, &way, stands)),
-        // Readings in a wrong unit are beyond the walls, or between floor and ceiling at random.
+        // Readings in a wrong unit are behind the walls, or anywhere between floor and ceiling.
         _ if all_moves && is_unit_in_doubt(evidence) => {
             let measured =
                 "not known: motion of the camera is measured from depth, whose unit is in doubt";
@@ -120,7 +120,7 @@ fn unusable(evidence: &Evidence) -> Option<&str> {
 
 /// Returns the finding for a log without odometry, whose robot is assumed to be at rest.
 fn at_rest(evidence: &Evidence) -> (Severity, String) {
-    let rays = evidence.samples.scans.changed();
+    let rays = evidence.samples.scans.first().and_then(Scans::changed);
     let moving = match (evidence.changed, rays) {
         (Some(share), _) => {
             Some((share, format!("{:.0} % of all points come and go", 100.0 * share)))
@@ -161,8 +161,8 @@ fn assumed(unusable: Option<&str>, moving: Option<(f64, String)>) -> (Severity, 
     }
 }
 
-/// Returns the words for odometry with gaps and jumps. Over these the way is not known, so that nothing
-/// is said of a robot that seems to stand.
+/// Returns the words for odometry with gaps and jumps. The distance driven during these is unknown,
+/// so that there is no statement on whether the robot was at rest.
 fn unsteady(gaps: u64, jumps: u64, way: &str, stands: bool) -> String {
     let mut parts = Vec::new();
     if gaps > 0 {

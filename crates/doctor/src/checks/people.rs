@@ -3,7 +3,7 @@ use tagalong_math::counted;
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
-/// Number of frames below which an empty result means little.
+/// Number of frames below which an empty result is not significant.
 const FEW_FRAMES: u64 = 10;
 
 /// Checks that people are found.

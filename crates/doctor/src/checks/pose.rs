@@ -1,10 +1,10 @@
-//! Pose of the camera by the visible floor, for several checks.
+//! Pose of the camera from the visible floor, for several checks.
 
 use tagalong_math::median;
 
 use super::super::evidence::Evidence;
 
-/// Returns height, pitch and roll by the floor, each the median over the frames.
+/// Returns height, pitch and roll from the floor, each as the median over the frames.
 pub fn by_floor(evidence: &Evidence) -> Option<[f64; 3]> {
     let floors = &evidence.samples.floors;
     Some([
@@ -14,7 +14,7 @@ pub fn by_floor(evidence: &Evidence) -> Option<[f64; 3]> {
     ])
 }
 
-/// Returns the settings for the camera's pose, by the floor where it is visible.
+/// Returns the settings for the pose of the camera, from the floor if it is visible.
 pub fn mount_lines(evidence: &Evidence) -> String {
     match by_floor(evidence) {
         Some([height, pitch, roll]) => format!(

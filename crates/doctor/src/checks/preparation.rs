@@ -1,10 +1,10 @@
 use super::super::evidence::{Evidence, Preparations};
 use super::super::finding::{Finding, Severity};
 
-/// Gain of the mean probability from which on another preparation is recommended.
+/// Gain of the mean probability from which another preparation is recommended.
 const MIN_GAIN: f64 = 0.1;
 
-/// Checks that images are prepared for a neural network as it expects them.
+/// Checks that the preparation of images is the one that the neural network expects.
 pub fn preparation(evidence: &Evidence) -> Option<Finding> {
     let judged = evidence.preparations.iter().map(judge);
     judged.max_by_key(|finding| finding.severity)

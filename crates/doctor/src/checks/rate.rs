@@ -20,7 +20,7 @@ impl Evidence {
     }
 }
 
-/// Checks the rate of the images, or of the scans where they make the frames.
+/// Checks the rate of the images, or of the scans if these make the frames.
 pub fn rate(evidence: &Evidence) -> Option<Finding> {
     let topic = evidence.primary()?;
     let Some(timing) = topic.timing else {

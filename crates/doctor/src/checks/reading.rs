@@ -1,23 +1,10 @@
+use tagalong_log::is_loss;
 use tagalong_math::counted;
 
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
-/// Counters of the reader that are no reason for a missing frame.
-const NO_REASON: [&str; 10] = [
-    "chunks_verified",
-    "chunks_without_crc",
-    "messages_unpacked",
-    "disparity_pixels",
-    "disparity_pixels_invalid",
-    "frames",
-    "messages",
-    "depth_registered",
-    "odometry_gap_frames",
-    "odometry_jump_frames",
-];
-
-/// Checks that the images of the log became frames.
+/// Checks that frames were made from the images of the log.
 pub fn reading(evidence: &Evidence) -> Option<Finding> {
     let made = evidence.reading.made;
     let wanted = evidence.reading.wanted.max(evidence.reading.made);
@@ -46,19 +33,17 @@ pub fn reading(evidence: &Evidence) -> Option<Finding> {
         .figure("frames", made as f64)
         .figure("wanted", wanted as f64)
         .why("no pipeline processes an image that makes no frame");
-    Some(finding.remedy(
-        "the notes of `tagalong inspect` say why; for a depth image far away in time see the \
-         finding `skew`",
-    ))
+    let sentences = [&evidence.losses[..], &evidence.frameless[..]].concat();
+    Some(if sentences.is_empty() { finding } else { finding.remedy(sentences.join("\n")) })
 }
 
-/// Returns the counters that tell why frames are missing.
+/// Returns the counters that explain missing frames.
 fn reasons(evidence: &Evidence, lost: f64) -> String {
     if lost <= 0.0 {
         return String::new();
     }
     let counters = evidence.inspection.counters.iter();
-    let telling = counters.filter(|(name, count)| !NO_REASON.contains(name) && **count > 0);
+    let telling = counters.filter(|(name, count)| is_loss(name) && **count > 0);
     let named: Vec<String> =
         telling.map(|(name, count)| format!("{} {count}", name.replace('_', " "))).collect();
     if named.is_empty() { String::new() } else { format!("; {}", named.join(", ")) }

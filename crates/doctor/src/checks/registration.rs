@@ -2,8 +2,9 @@ use tagalong_vision::registration::Offset;
 
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
+use super::depth::doubt;
 
-/// Columns of the image that the limits on offsets refer to.
+/// Number of columns of the image to which the limits on offsets refer.
 const USUAL_COLUMNS: f64 = 640.0;
 
 /// Greatest error of an offset that is reported, as a fraction of the offset.
@@ -17,15 +18,15 @@ pub fn registration(evidence: &Evidence) -> Option<Finding> {
         return None;
     }
     let Some(offset) = evidence.samples.overlap.offset() else {
-        let why = "no outlines in depth to compare with colour";
+        let why = doubt(evidence).unwrap_or("no outlines in depth to compare with colour");
         return Some(Finding::new("registration", Severity::Unknown, why));
     };
     let [dx, dy] = offset.px;
     let error = offset.error_px[0].hypot(offset.error_px[1]);
     let off = f64::from(dx).hypot(f64::from(dy));
     let scale = (camera.width as f64 / USUAL_COLUMNS).clamp(0.5, 2.0);
-    // An offset near its own error is no evidence of a misregistration: outlines of the floor may
-    // have any offset along them, before a camera near it.
+    // An offset near its own error is not evidence of a misregistration: with a camera near the
+    // floor, outlines of the floor may have any offset along them.
     if offset.contrast < 0.25 || error > SURE * off.max(16.0 * scale) {
         let measured = format!(
             "not measurable from the outlines in depth and colour ({dx:+}, {dy:+} px, give or \

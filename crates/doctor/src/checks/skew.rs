@@ -19,7 +19,8 @@ pub fn skew(evidence: &Evidence) -> Option<Finding> {
             "use the times of recording instead of the stamps:\n[input] stamps = \"recording\"",
         ));
     }
-    // A slower depth camera cannot pair with every colour image, which is no fault of the stamps.
+    // A slower depth camera cannot pair with every colour image, which is not a fault of the
+    // stamps.
     let possible = (depth as f64 / colour.max(1) as f64).min(1.0);
     let share = skew.paired / possible.max(1e-9);
     let late = skew.median_s.abs();

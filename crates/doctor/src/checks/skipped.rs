@@ -1,7 +1,8 @@
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
-/// Counters of messages that are skipped without being damaged: the name, the words, the remedy.
+/// Counters of undamaged messages that are skipped, each with its name, its description and a
+/// remedy.
 const SKIPPED: [(&str, &str, &str); 8] = [
     (
         "messages_not_read",
@@ -43,13 +44,13 @@ const SKIPPED: [(&str, &str, &str); 8] = [
     ),
 ];
 
-/// Share of the messages beyond which skipped ones are a serious problem.
+/// Share of skipped messages above which they are a serious problem.
 const MOST: f64 = 0.5;
 
-/// Share of pixels without disparity that is usual: half of them.
+/// Usual share of pixels without disparity.
 const USUAL_INVALID: f64 = 0.5;
 
-/// Checks that messages were used, as far as the reader counts those that were not.
+/// Checks the counters of messages that the reader did not use.
 pub fn skipped(evidence: &Evidence) -> Option<Finding> {
     let found: Vec<_> = SKIPPED
         .iter()
@@ -57,7 +58,11 @@ pub fn skipped(evidence: &Evidence) -> Option<Finding> {
         .filter(|((severity, _), ..)| *severity > Severity::Ok)
         .collect();
     if found.is_empty() {
-        return Some(Finding::new("skipped", Severity::Ok, "no message was left out"));
+        return Some(Finding::new(
+            "skipped",
+            Severity::Ok,
+            "no message of the topics used was left out",
+        ));
     }
     let severity = found.iter().map(|((severity, _), ..)| *severity).max()?;
     let measured: Vec<String> =

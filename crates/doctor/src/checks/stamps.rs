@@ -1,10 +1,11 @@
 use tagalong_log::{StampSource, Timing};
+use tagalong_math::counted;
 
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
 impl Evidence {
-    /// Returns the topics of the images and of the laser scans, with their stamps.
+    /// Returns the topics of images and laser scans, with their stamps.
     fn timings(&self) -> impl Iterator<Item = (&str, Timing)> {
         let facts = &self.inspection.facts;
         let topics =
@@ -14,7 +15,7 @@ impl Evidence {
     }
 }
 
-/// Checks for gaps, clocks that jump, and stamps that were never set.
+/// Checks for gaps, jumps of the clock, and stamps that were never set.
 pub fn stamps(evidence: &Evidence) -> Option<Finding> {
     if let Some(topic) =
         evidence.primary().filter(|topic| topic.count > 1 && topic.timing.is_none())
@@ -25,15 +26,21 @@ pub fn stamps(evidence: &Evidence) -> Option<Finding> {
             evidence.inspection.counters.contains_key(REPLACED),
         ));
     }
-    let judged = evidence.timings().map(|(topic, timing)| judge(topic, &timing));
+    let late = evidence.inspection.counters.get("late_frames").copied().unwrap_or(0);
+    let primary = evidence.primary().map(|topic| topic.topic.as_str());
+    let judged = evidence.timings().map(|(topic, timing)| {
+        // Of other topics each message is found by its stamp, in whatever order they come.
+        let late = if Some(topic) == primary { late } else { 0 };
+        judge(topic, &timing, late, evidence.input.reorder_frames)
+    });
     // With equal severity the first topic wins: `max_by` alone would return the last.
     judged.max_by(|a, b| a.severity.cmp(&b.severity).then(std::cmp::Ordering::Greater))
 }
 
-/// Counter of the reader for a log whose stamps it replaces by the times of recording.
+/// Counter of the reader for logs whose stamps it replaces with recording times.
 const REPLACED: &str = "logs_without_stamps";
 
-/// Returns the finding for a topic without a stamp that is later than the one before.
+/// Returns the finding for a topic in which no stamp is later than the previous one.
 fn unset(topic: &str, used: StampSource, is_replaced: bool) -> Finding {
     let recording = "the times of recording are used instead of all stamps";
     let (severity, taken) = match used {
@@ -53,14 +60,17 @@ fn unset(topic: &str, used: StampSource, is_replaced: bool) -> Finding {
         )
 }
 
-/// Returns the worst problem with the stamps of a topic.
-fn judge(topic: &str, timing: &Timing) -> Finding {
+/// Returns the worst problem with the stamps of a topic, of which so many messages came too late for an
+/// order over `reorder_frames` images.
+fn judge(topic: &str, timing: &Timing, late: u64, reorder_frames: usize) -> Finding {
     let period = timing.median_period_s;
     if timing.longest_step_back_s > (4.0 * period).max(0.5) {
         let measured =
             format!("{topic}: the clock is set back by {:.2} s", timing.longest_step_back_s);
         return about_stamps(timing, Severity::Bad, measured)
-            .why("tracks end at the jump, and people get new IDs after it")
+            .why(
+                "tracks end at the jump, and people who are not re-identified get new IDs after it",
+            )
             .remedy(
                 "record with one clock (use_sim_time on all nodes or on none; no looping bag)",
             );
@@ -72,19 +82,29 @@ fn judge(topic: &str, timing: &Timing) -> Finding {
             .remedy(format!("[clock] reset_gap_s = {:.1}", timing.longest_gap_s.ceil() + 1.0));
     }
     if timing.steps_back + timing.repeated > 0 {
-        let measured = format!(
-            "{topic}: {} messages out of order, {} with the stamp of another",
-            timing.steps_back, timing.repeated
-        );
-        return about_stamps(timing, Severity::Warn, measured)
+        let mut parts: Vec<String> = Vec::new();
+        if timing.steps_back > 0 {
+            let messages = counted(timing.steps_back as u64, "message");
+            parts.push(if late > 0 {
+                format!("{messages} out of order, {late} too late to be put in order")
+            } else {
+                format!("{messages} out of order, put in order")
+            });
+        }
+        if timing.repeated > 0 {
+            let messages = counted(timing.repeated as u64, "message");
+            parts.push(format!("{messages} with the stamp of the one before"));
+        }
+        let severity = if late > 0 { Severity::Warn } else { Severity::Ok };
+        return about_stamps(timing, severity, format!("{topic}: {}", parts.join(", ")))
             .why("messages that come later than a few others are dropped")
-            .remedy("[input] reorder_frames = 8");
+            .remedy(format!("[input] reorder_frames = {}", (2 * reorder_frames).max(8)));
     }
     let measured = format!("in order; the longest gap is {:.2} s", timing.longest_gap_s);
     about_stamps(timing, Severity::Ok, measured)
 }
 
-/// A finding on the stamps of a topic, with its figures.
+/// Returns a finding on the stamps of a topic, with its figures.
 fn about_stamps(timing: &Timing, severity: Severity, measured: String) -> Finding {
     Finding::new("stamps", severity, measured)
         .figure("longest_gap_s", timing.longest_gap_s)
@@ -94,7 +114,24 @@ fn about_stamps(timing: &Timing, severity: Severity, measured: String) -> Findin
 
 #[cfg(test)]
 mod tests {
+    use tagalong_core::Stamp;
+
     use super::*;
+
+    #[test]
+    fn messages_that_are_put_in_order_are_no_problem() {
+        let stamps = [0.0, 0.1, 0.3, 0.2, 0.4].map(|at| Stamp::default().plus_seconds(1.0 + at));
+        let timing = Timing::of(&stamps).unwrap();
+        let told = judge("/camera", &timing, 0, 3);
+        assert_eq!((told.severity, told.remedy), (Severity::Ok, None));
+        assert_eq!(told.measured, "/camera: 1 message out of order, put in order");
+        let told = judge("/camera", &timing, 1, 3);
+        assert_eq!(told.severity, Severity::Warn);
+        assert!(told.measured.ends_with("1 too late to be put in order"), "{}", told.measured);
+        assert_eq!(told.remedy.as_deref(), Some("[input] reorder_frames = 8"));
+        let told = judge("/camera", &timing, 1, 8);
+        assert_eq!(told.remedy.as_deref(), Some("[input] reorder_frames = 16"));
+    }
 
     #[test]
     fn stamps_that_were_never_set_are_told_with_the_times_that_are_taken() {

@@ -6,14 +6,15 @@ use super::super::finding::{Finding, Severity};
 use super::super::present::BY_EVIDENCE;
 use super::{Alternative, better};
 
-/// Boxes below which shares mean little.
+/// Number of boxes below which shares are not significant.
 const FEW_BOXES: usize = 5;
 
-/// Shares of idle boxes that are a warning, and a serious one: more than one person sitting among
-/// others.
+/// Shares of idle boxes that are a warning and a serious problem: more than one seated person among
+/// others would cause.
 const IDLE: (f64, f64) = (0.1, 0.65);
 
-/// Checks that tracks are not of things: they move at some time, or something stirs where they are.
+/// Checks that tracks are not those of objects: they move at some time, or something moves at their
+/// position.
 pub fn still(evidence: &Evidence) -> Option<Finding> {
     let coverage = &evidence.coverage;
     if coverage.boxes == 0 {
@@ -23,7 +24,7 @@ pub fn still(evidence: &Evidence) -> Option<Finding> {
     let still_share = coverage.still_boxes as f64 / coverage.boxes as f64;
     let idle_share = coverage.idle();
     let mut severity = Severity::beyond(idle_share, IDLE.0, IDLE.1);
-    // Of tracks that live too briefly to be judged, nothing is certain.
+    // Tracks that are too short to be judged prove nothing.
     let are_judged = coverage.moving + coverage.still > 0;
     if coverage.boxes < FEW_BOXES || !are_judged {
         severity = severity.min(Severity::Warn);
@@ -52,7 +53,7 @@ pub fn still(evidence: &Evidence) -> Option<Finding> {
     Some(finding.remedy(remedy(evidence)))
 }
 
-/// Returns the change that helped most on this log, else a general one.
+/// Returns the change that helped most on this log, or else general advice.
 fn remedy(evidence: &Evidence) -> String {
     let now = &evidence.coverage;
     match better(evidence, |other| other.idle_boxes < now.idle_boxes) {
@@ -68,7 +69,7 @@ fn remedy(evidence: &Evidence) -> String {
     }
 }
 
-/// Returns advice on another config, unless it is taken already or cannot be taken.
+/// Returns the advice to use another config, unless it is already in use or cannot be used.
 fn other_config(evidence: &Evidence) -> String {
     let usable = &evidence.inspection.usable;
     let fits =
@@ -80,5 +81,5 @@ fn other_config(evidence: &Evidence) -> String {
     }
 }
 
-/// Config whose verifiers drop things.
+/// Config whose verifiers drop objects.
 const VERIFIED: &str = "depth-verified";

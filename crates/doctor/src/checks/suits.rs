@@ -3,8 +3,8 @@ use tagalong_pipeline::Suits;
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 
-/// Deviations from a stated range that are no matter, and those that are a serious one: of the
-/// height, m, and of the pitch, degrees.
+/// Deviations from a stated range that are harmless, and those that are serious: of the height, m,
+/// and of the pitch, degrees.
 const HEIGHT_M: (f64, f64) = (Suits::HEIGHT_TOLERANCE_M, 0.5);
 const PITCH_DEG: (f64, f64) = (3.0, 15.0);
 
@@ -13,7 +13,7 @@ pub fn suits(evidence: &Evidence) -> Option<Finding> {
     odometry(evidence).or_else(|| baseline(evidence)).or_else(|| camera(evidence))
 }
 
-/// Checks that a config that needs odometry gets it.
+/// Checks that the log has odometry if the config needs it.
 fn odometry(evidence: &Evidence) -> Option<Finding> {
     if !evidence.suits.odometry || evidence.has_odometry {
         return None;
@@ -29,7 +29,7 @@ fn odometry(evidence: &Evidence) -> Option<Finding> {
     ))
 }
 
-/// Checks that a stereo pair has a baseline for which the config is.
+/// Checks that the baseline of a stereo pair suits the config.
 fn baseline(evidence: &Evidence) -> Option<Finding> {
     let baseline_m = evidence.inspection.facts.baseline_m?;
     let range = evidence.suits.baseline_m?;

@@ -1,4 +1,4 @@
-//! Course of a pipeline over a log: where its confirmed tracks were.
+//! Positions of the confirmed tracks of a pipeline over a log.
 
 use std::collections::BTreeMap;
 
@@ -10,15 +10,15 @@ use tagalong_pipeline::FrameReport;
 /// Confirmed track in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placed {
-    /// Number of the track.
+    /// ID of the track.
     pub id: u32,
-    /// Place on the floor, odometry frame, m.
+    /// Position on the floor, odometry frame, m.
     pub place: Point2<f64>,
     /// Distance from the robot, m.
     pub range_m: f64,
-    /// Standard deviation of the place, m.
+    /// Standard deviation of the position, m.
     pub sigma_m: f64,
-    /// True if evidence of this frame supports it.
+    /// True if there is evidence for it in this frame.
     pub seen: bool,
 }
 
@@ -36,38 +36,38 @@ pub struct Moment {
 /// Confirmed tracks of all frames.
 #[derive(Clone, Debug, Default)]
 pub struct Course {
-    /// The frames in their order.
+    /// The frames in order.
     pub moments: Vec<Moment>,
-    /// Time that the pipeline took, ms.
+    /// Time of the pipeline, ms.
     pub spent_ms: f64,
 }
 
 /// Motion of a track over its life.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Life {
-    /// It left its place.
+    /// The track left its first position.
     Moved,
-    /// It stayed within the noise for long enough to tell.
+    /// The track stayed within the noise for long enough.
     Still,
-    /// Too short, or places too uncertain, to tell.
+    /// The track is too short, or its positions are too uncertain.
     Unclear,
 }
 
-/// Lives of the tracks, by their numbers.
+/// Motion of the tracks, by their IDs.
 pub type Lives = BTreeMap<u32, Life>;
 
-/// Life of a track that never left its place, at least, s.
+/// Least duration of a track that counts as static, s.
 pub const STILL_S: f64 = 3.0;
 
-/// Distance from its place that counts as motion, m, and its growth with the distance from the
-/// robot, as the noise of depth grows.
+/// Distance from the first position that counts as motion, m, and its growth with the distance from
+/// the robot, because the noise of depth grows.
 const MOVED_M: f64 = 0.4;
 const MOVED_GROWTH: f64 = 0.03;
 
-/// Number of frames below which each of them counts.
+/// Number of frames up to which all of them are used.
 const SHORT: usize = 6;
 
-/// Uncertainty of a place beyond which motion cannot be told, m.
+/// Uncertainty of a position above which motion cannot be detected, m.
 const MAX_SIGMA_M: f64 = 0.5;
 
 impl Course {
@@ -93,7 +93,7 @@ impl Course {
         });
     }
 
-    /// Returns the life of each track.
+    /// Returns the motion of each track.
     pub fn lives(&self) -> Lives {
         let mut seen: BTreeMap<u32, Vec<(Stamp, Placed)>> = BTreeMap::new();
         for moment in &self.moments {
@@ -105,7 +105,7 @@ impl Course {
     }
 }
 
-/// Returns the median of a value; 0 without any.
+/// Returns the median of the values; 0 if there are none.
 fn middle(part: &[(Stamp, Placed)], value: impl Fn(&Placed) -> f64) -> f64 {
     median(part.iter().map(|(_, placed)| value(placed))).unwrap_or(0.0)
 }
@@ -114,12 +114,12 @@ fn middle_place(part: &[(Stamp, Placed)]) -> Point2<f64> {
     Point2::new(middle(part, |placed| placed.place.x), middle(part, |placed| placed.place.y))
 }
 
-/// Judges the motion of a track by the frames in which it was seen.
+/// Classifies the motion of a track from the frames in which it was seen.
 fn life(seen: &[(Stamp, Placed)]) -> Life {
     let noise_m = MOVED_M + MOVED_GROWTH * middle(seen, |placed| placed.range_m);
     let home = middle_place(seen);
-    // The median of three frames in a row: a single wild detection is no motion. Short tracks of
-    // slow cameras have no frames to spare.
+    // The median of three frames in a row, so that a single outlier is not taken for motion. Short
+    // tracks of slow cameras have too few frames for this.
     let length = if seen.len() < SHORT { 1 } else { 3 };
     let farthest =
         seen.windows(length).map(|part| (middle_place(part) - home).norm()).fold(0.0, f64::max);
@@ -138,7 +138,7 @@ fn life(seen: &[(Stamp, Placed)]) -> Life {
 mod tests {
     use super::*;
 
-    /// A track seen ten times a second at these places along the x axis, m.
+    /// Returns a track that is seen ten times a second at these positions along the x axis, m.
     fn walk(places: &[f64]) -> Life {
         let mut seen = Vec::new();
         for (i, x) in places.iter().enumerate() {

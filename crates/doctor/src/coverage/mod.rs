@@ -1,4 +1,4 @@
-//! Coverage: what comes and goes in a log, against the tracks of a pipeline.
+//! Coverage: shapes that come and go in a log, compared with the tracks of a pipeline.
 
 mod course;
 
@@ -10,53 +10,53 @@ use course::{Life, Lives, Moment, Placed};
 
 use super::scenery::{self, Blob, Scenery};
 
-/// Distance of a track from the people-sized blob that it explains, m.
+/// Largest distance of a track from a person-sized blob that it explains, m.
 const EXPLAINS_M: f64 = 0.5;
 
-/// Distance around a track within which something has to come or go, m, and the share of the points
-/// there that have to.
+/// Distance around a track within which points have to come or go, m, and the share of them that
+/// has to.
 const STIRS_M: f64 = 0.4;
 const STIRS_SHARE: f64 = 0.15;
 
-/// Figures of a pipeline on a log, without any truth.
+/// Figures of a pipeline on a log without truth.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Coverage {
-    /// True if there are depth images to compare with.
+    /// True if there are depth images for the comparison.
     pub has_depth: bool,
-    /// Frames that the pipeline was given.
+    /// Number of frames that the pipeline processed.
     pub frames: usize,
-    /// Frames in which a confirmed track was seen.
+    /// Number of frames in which a confirmed track was seen.
     pub frames_with_people: usize,
-    /// Confirmed tracks that left their place.
+    /// Confirmed tracks that left their first position.
     pub moving: usize,
     /// Confirmed tracks that never did.
     pub still: usize,
-    /// Confirmed tracks of which that cannot be told.
+    /// Confirmed tracks whose motion is uncertain.
     pub unclear: usize,
-    /// Boxes: confirmed tracks that were seen, over all frames.
+    /// Boxes: confirmed tracks that were seen, summed over all frames.
     pub boxes: usize,
     /// Boxes of tracks that never moved.
     pub still_boxes: usize,
-    /// Boxes at places where nothing ever comes or goes; where the depth image does not show the
-    /// place, boxes of tracks that never moved.
+    /// Boxes at positions where nothing ever comes or goes; if the depth image does not show the
+    /// position, boxes of tracks that never moved.
     pub idle_boxes: usize,
-    /// People-sized blobs that come and go, over all frames with depth.
+    /// Person-sized blobs that come and go, summed over all frames with depth.
     pub blobs: usize,
-    /// Those of them without a track.
+    /// Such blobs without a track.
     pub unexplained: usize,
-    /// Frames with an unexplained blob.
+    /// Number of frames with an unexplained blob.
     pub frames_unexplained: usize,
     /// Example of an unexplained blob.
     pub example: Option<Example>,
     /// Frames with unexplained blobs, those with the most first.
     #[serde(skip)]
     pub missed_frames: Vec<u64>,
-    /// Mean time of a frame, ms.
+    /// Mean time per frame, ms.
     #[serde(skip)]
     pub frame_ms: f64,
 }
 
-/// Place of an unexplained blob.
+/// Position of an unexplained blob.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Example {
     /// Index of the frame.
@@ -70,7 +70,7 @@ pub struct Example {
 }
 
 impl Coverage {
-    /// Compares the tracks of a pipeline with what comes and goes.
+    /// Compares the tracks of a pipeline with the shapes that come and go.
     pub fn of(course: &Course, scenery: &Scenery) -> Self {
         let has_depth = !scenery.moments.is_empty();
         let mut out = Self { has_depth, frames: course.moments.len(), ..Self::default() };
@@ -84,7 +84,7 @@ impl Coverage {
             missed.extend(seen.map(|seen| (out.add_blobs(moment, seen), moment.index)));
         }
         missed.retain(|(count, _)| *count > 0);
-        // Stable: of equal ones the earlier frame comes first.
+        // The sort is stable: of equal frames the earlier one comes first.
         missed.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
         out.frames_unexplained = missed.len();
         out.missed_frames = missed.into_iter().map(|(_, index)| index).collect();
@@ -102,7 +102,7 @@ impl Coverage {
         }
     }
 
-    /// Counts the boxes of a frame: of tracks that never moved, and at idle places.
+    /// Counts the boxes of a frame, those of tracks that never moved, and those at idle positions.
     fn add_boxes(&mut self, moment: &Moment, lives: &Lives, seen: Option<&scenery::Moment>) {
         let boxes = self.boxes;
         for track in moment.tracks.iter().filter(|track| track.seen) {
@@ -137,21 +137,21 @@ impl Coverage {
         (self.blobs > 0).then(|| 1.0 - self.unexplained as f64 / self.blobs as f64)
     }
 
-    /// Returns the share of the boxes where nothing ever comes or goes.
+    /// Returns the share of boxes at which nothing ever comes or goes.
     pub fn idle(&self) -> f64 {
         self.idle_boxes as f64 / self.boxes.max(1) as f64
     }
 
-    /// Returns a figure by which settings can be ranked, 0 to 1: the F1 measure with blobs that come
-    /// and go in place of people, and boxes where nothing ever does in place of false ones. It is no
-    /// truth: people who never stir count as false.
+    /// Returns a score for ranking settings, 0 to 1: the F1 measure with blobs that come and go
+    /// instead of people, and boxes at which nothing ever does as false positives. It is only an
+    /// estimate: people that never move count as false.
     pub fn worth(&self) -> f64 {
         let found = (self.blobs - self.unexplained) as f64;
         let wrong = (self.unexplained + self.idle_boxes) as f64;
         2.0 * found / (2.0 * found + wrong).max(1.0)
     }
 
-    /// Returns the boxes of a frame on average.
+    /// Returns the mean number of boxes per frame.
     pub fn boxes_a_frame(&self) -> f64 {
         self.boxes as f64 / self.frames.max(1) as f64
     }
@@ -169,7 +169,7 @@ fn is_explained(blob: Point2<f64>, tracks: &[Placed]) -> bool {
     tracks.iter().any(|track| (track.place - blob).norm() <= EXPLAINS_M)
 }
 
-/// Other setting, and its figures.
+/// Alternative setting and its figures.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Alternative {
     /// Line of a config, or the name of another config.
@@ -187,7 +187,7 @@ mod tests {
 
     const FRAMES: u64 = 40;
 
-    /// Tracks at places by the time, in all frames.
+    /// Tracks at given positions over time, in all frames.
     fn course(tracks: &[&dyn Fn(f64) -> Point2<f64>]) -> Course {
         let moments = (0..FRAMES).map(|number| {
             let seconds = 0.1 * number as f64;

@@ -1,8 +1,8 @@
-//! Things that came or went in the depth images of a log, whatever a pipeline makes of them.
+//! Objects that appear or disappear in the depth images of a log, independent of any pipeline.
 //!
-//! A point has come or gone if other views of the log look through its place. Furniture and walls
-//! were there all the time; people were not, but for those that never stir. Ego-motion is taken out
-//! by the odometry, so that a driven log can be judged, too.
+//! A point has come or gone if other views of the log look through its position. Furniture and
+//! walls are there all the time; people are not, except those that never move. The odometry
+//! compensates ego-motion, so that logs of a driving robot can be judged, too.
 
 mod plan;
 #[cfg(test)]
@@ -17,19 +17,19 @@ use tagalong_geometry::{HALF_HEAD_M, Rect};
 use tagalong_log::LogFrame;
 use view::{Look, View};
 
-/// Most views that are kept: some 100 kB each.
+/// Largest number of views that are kept, about 100 kB each.
 const MOST_VIEWS: u64 = 400;
 
-/// Views with which each one is compared.
+/// Number of views with which each view is compared.
 const COMPARED: usize = 24;
 
-/// Time between two views that are compared, at most, s: odometry drifts.
+/// Largest time between two views that are compared, s, because odometry drifts.
 const COMPARED_S: f64 = 30.0;
 
-/// Heights of the points that are used, m: people, but neither floor nor ceiling.
+/// Heights of the points that are used, m: those of people, without floor and ceiling.
 const HEIGHTS_M: RangeInclusive<f64> = 0.5..=2.1;
 
-/// Number and share of views through a point that has changed.
+/// Number and share of views through a point from which it has changed.
 const MIN_THROUGH: u32 = 2;
 const MIN_SHARE: f64 = 0.3;
 
@@ -39,34 +39,34 @@ pub struct Views {
     views: Vec<View>,
 }
 
-/// Judged depth images of a log.
+/// Classified depth images of a log.
 #[derive(Default)]
 pub struct Scenery {
-    /// One for each view, by the time.
+    /// One image for each view, in the order of time.
     pub moments: Vec<Moment>,
     /// Share of the points that came or went, of those whose place enough other views show; `None`
     /// without any.
     pub changed: Option<f64>,
 }
 
-/// Judged depth image.
+/// Classified depth image.
 pub struct Moment {
     /// Index of the frame.
     pub index: u64,
-    /// Points from above.
+    /// Plan view of the points.
     pub plan: Plan,
-    /// Groups of changed points of the size of a person.
+    /// Person-sized groups of changed points.
     pub blobs: Vec<Blob>,
     view: View,
 }
 
 impl Views {
-    /// Returns an empty collection for about so many frames.
+    /// Creates an empty collection for an expected number of frames.
     pub fn of(frames: u64) -> Self {
         Self { every: frames / MOST_VIEWS + 1, views: Vec::new() }
     }
 
-    /// Takes the depth image of a frame if it is its turn.
+    /// Adds the depth image of a frame if it is selected.
     pub fn take(&mut self, number: u64, item: &LogFrame) {
         if number.is_multiple_of(self.every) {
             self.views.extend(View::of(item));
@@ -105,7 +105,7 @@ impl Views {
         Scenery { moments: moments.collect(), changed: share }
     }
 
-    /// Returns some views near one in time, spread evenly.
+    /// Returns some views close in time to one, spread evenly.
     fn others(&self, at: usize) -> Vec<&View> {
         let now = self.views[at].stamp;
         let near = self.views.iter();
@@ -120,7 +120,7 @@ impl Views {
 }
 
 impl Scenery {
-    /// Returns the judged image of a frame.
+    /// Returns the classified image of a frame.
     pub fn moment(&self, index: u64) -> Option<&Moment> {
         let at = self.moments.binary_search_by_key(&index, |moment| moment.index).ok()?;
         self.moments.get(at)
@@ -128,7 +128,7 @@ impl Scenery {
 }
 
 impl Moment {
-    /// Returns the distance from the camera and the bearing (positive to the left) of a place of
+    /// Returns the distance from the camera and the bearing (positive to the left) of a position in
     /// the odometry frame, m and degrees.
     pub fn bearing_of(&self, place: Point2<f64>) -> (f64, f64) {
         self.view.bearing_of(place)
@@ -202,7 +202,7 @@ mod tests {
         assert_eq!(first.plan.changed_share(Point2::new(1.5, 6.0), 0.4), None, "out of view");
     }
 
-    /// With the odometry the pillar stays where it is; without it everything seems to move.
+    /// With odometry the pillar is static; without it everything seems to move.
     #[test]
     fn ego_motion_is_taken_out() {
         let known = Room::default().seen(40, 0.3).judge();
@@ -215,7 +215,8 @@ mod tests {
     #[test]
     fn things_of_another_size_are_no_people() {
         for (width_m, top_m) in [(1.6, 1.7), (0.1, 1.7), (0.5, 0.9)] {
-            // Fast, because the middle of a slow wide board hides the wall nearly all the time.
+            // The board is fast, because the middle of a slow wide board hides the wall nearly all
+            // the time.
             let start = Point2::new(3.0, 4.0);
             let thing = Thing { start, speed_mps: 2.0, width_m, top_m };
             let scenery = Room::default().with(thing).seen(40, 0.0).judge();

@@ -1,4 +1,4 @@
-//! Plan view of one frame: how much of what stands in a cell has come or gone.
+//! Plan view of one frame, with the share of points in each cell that have come or gone.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,13 +9,13 @@ use super::view::View;
 /// Side of a cell, m.
 pub const CELL_M: f64 = 0.1;
 
-/// Changed points of a cell that counts as changed.
+/// Least number of changed points in a cell that counts as changed.
 const MIN_CHANGED: u32 = 3;
 
 /// Cell of a plan, by column and row.
 type Key = [i32; 2];
 
-/// Points in a cell.
+/// Counts of points in a cell.
 #[derive(Clone, Copy, Debug)]
 struct Cell {
     points: u32,
@@ -25,13 +25,13 @@ struct Cell {
     high: f64,
 }
 
-/// Points of a view from above, in the odometry frame.
+/// Plan view of the points of a frame, in the odometry frame.
 #[derive(Default)]
 pub struct Plan {
     cells: BTreeMap<Key, Cell>,
 }
 
-/// Group of changed points of the size of a person.
+/// Person-sized group of changed points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Blob {
     /// Centre, odometry frame, m.
@@ -42,13 +42,13 @@ pub struct Blob {
     pub top_m: f64,
 }
 
-/// Width of people, m: in whole cells, so wider by one than the person.
+/// Range of the width of people, m, in whole cells, so that it is one cell wider than the person.
 const WIDTH_M: std::ops::RangeInclusive<f64> = 0.25..=0.95;
 
 /// Least height from the lowest to the highest point of a person, m.
 const MIN_SPAN_M: f64 = 0.5;
 
-/// Visible surface of a person that has to be there, square metres: a part of the trunk.
+/// Least visible surface of a person, square metres: a part of the trunk.
 const MIN_AREA_M2: f64 = 0.08;
 
 impl Plan {
@@ -64,8 +64,8 @@ impl Plan {
         }
     }
 
-    /// Returns the share of changed points within a distance of a place; `None` if the view shows
-    /// nothing there.
+    /// Returns the share of changed points within a distance of a position; `None` if the view
+    /// shows nothing there.
     pub fn changed_share(&self, place: Point2<f64>, within_m: f64) -> Option<f64> {
         let near = self.cells.iter().filter(|(key, _)| (centre(key) - place).norm() <= within_m);
         let [points, changed] =
@@ -73,7 +73,7 @@ impl Plan {
         (points >= MIN_POINTS).then(|| f64::from(changed) / f64::from(points))
     }
 
-    /// Returns the groups of changed points that have the size of a person.
+    /// Returns the person-sized groups of changed points.
     pub fn blobs(&self, view: &View) -> Vec<Blob> {
         let changed = self.cells.iter().filter(|(_, cell)| cell.changed >= MIN_CHANGED);
         let mut left: BTreeSet<Key> = changed.map(|(key, _)| *key).collect();
@@ -105,7 +105,7 @@ impl Plan {
     }
 }
 
-/// Points around a place below which nothing is said about it.
+/// Least number of points around a position for a statement about it.
 const MIN_POINTS: u32 = 10;
 
 fn key(place: Point2<f64>) -> Key {
@@ -116,7 +116,8 @@ fn centre(key: &Key) -> Point2<f64> {
     Point2::new((f64::from(key[0]) + 0.5) * CELL_M, (f64::from(key[1]) + 0.5) * CELL_M)
 }
 
-/// Takes the cells that are connected with one, diagonals included, out of those that are left.
+/// Removes the cells that are connected with one, including diagonally, from those that are left,
+/// and returns them.
 fn group(first: Key, left: &mut BTreeSet<Key>) -> Vec<Key> {
     let mut found = vec![first];
     let mut next = 0;

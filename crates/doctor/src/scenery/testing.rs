@@ -9,7 +9,7 @@ use tagalong_log::LogFrame;
 
 use super::Views;
 
-/// Place of the pillar, odometry frame, m.
+/// Position of the pillar, odometry frame, m.
 pub const PILLAR: Point2<f64> = Point2::new(3.5, 1.2);
 
 /// Distance of the wall, m.
@@ -18,7 +18,7 @@ const WALL_M: f64 = 5.5;
 /// Upright board that faces the robot and moves along the wall.
 #[derive(Clone, Copy, Debug)]
 pub struct Thing {
-    /// Place at the start, m.
+    /// Position at the start, m.
     pub start: Point2<f64>,
     /// Speed to the right, m/s.
     pub speed_mps: f64,
@@ -34,17 +34,17 @@ impl Thing {
         Self { start: Point2::new(3.0, 0.9), speed_mps: 0.5, width_m: 0.45, top_m: 1.7 }
     }
 
-    /// Returns the place of its middle at a time, m.
+    /// Returns the position of its middle at a time, m.
     pub fn place(&self, seconds: f64) -> Point2<f64> {
         self.start - Vector2::new(0.0, self.speed_mps * seconds)
     }
 }
 
-/// Room with a wall, a floor, a pillar and other things.
+/// Room with a wall, a floor, a pillar and other objects.
 pub struct Room {
-    /// The things, the pillar among them.
+    /// The objects, including the pillar.
     pub things: Vec<Thing>,
-    /// True if frames carry the pose of the robot.
+    /// True if frames contain the pose of the robot.
     pub odometry: bool,
 }
 
@@ -56,20 +56,21 @@ impl Default for Room {
 }
 
 impl Room {
-    /// Adds a thing.
+    /// Adds an object.
     pub fn with(mut self, thing: Thing) -> Self {
         self.things.push(thing);
         self
     }
 
-    /// Returns so many views of it, ten a second, of a robot that drives ahead at a speed, m/s.
+    /// Returns a number of views of it, ten per second, from a robot that drives ahead at a speed,
+    /// m/s.
     pub fn seen(&self, frames: u64, speed_mps: f64) -> Views {
         let mut views = Views::of(frames);
         (0..frames).for_each(|number| views.take(number, &self.frame(number, speed_mps)));
         views
     }
 
-    /// Returns a frame of it.
+    /// Returns a frame of the room.
     pub fn frame(&self, number: u64, speed_mps: f64) -> LogFrame {
         let seconds = 0.1 * number as f64;
         let travel = speed_mps * seconds;
@@ -88,7 +89,7 @@ impl Room {
         }
     }
 
-    /// Returns the depth at a pixel, m: of the nearest board, of the wall or of the floor.
+    /// Returns the depth at a pixel, m: that of the nearest board, the wall or the floor.
     fn depth(&self, camera: &Camera, pixel: Point2<f64>, travel: f64, seconds: f64) -> f64 {
         let ray: Vector3<f64> = camera.robot_from_camera.rotation * camera.ray(pixel);
         let eye = Point3::new(travel, 0.0, camera.height_m());

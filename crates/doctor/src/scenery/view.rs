@@ -5,14 +5,14 @@ use tagalong_core::{DepthImage, Stamp, spatial_pose};
 use tagalong_geometry::{Camera, Lens, Rect};
 use tagalong_log::LogFrame;
 
-/// Columns of a reduced image, at least.
+/// Least number of columns of a reduced image.
 const COLUMNS: usize = 128;
 
-/// Depth at which readings are used, m: nearer there is no shape, farther the steps of depth are as
-/// large as people.
+/// Range of depth in which readings are used, m: nearer objects show no shape, and at larger
+/// distances the steps of depth are as large as people.
 const DEPTH_M: std::ops::RangeInclusive<f32> = 0.3..=6.5;
 
-/// Depth image at reduced size, with its camera's pose in the odometry frame.
+/// Depth image at reduced size, with the pose of its camera in the odometry frame.
 pub struct View {
     /// Index of the frame.
     pub index: u64,
@@ -25,25 +25,25 @@ pub struct View {
     camera: Camera,
     odom_from_camera: Isometry3<f64>,
     camera_from_odom: Isometry3<f64>,
-    /// Readings, row by row, m; NaN where there is none.
+    /// Readings, row by row, m; NaN for no reading.
     depth: Vec<f32>,
-    /// Smallest reading within one pixel, m; infinite where there is none.
+    /// Smallest reading within one pixel, m; infinite for no reading.
     nearest: Vec<f32>,
 }
 
-/// Comparison of a point with the reading of a later or earlier view.
+/// Result of comparing a point with the reading of a later or earlier view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Look {
-    /// The view looks through the point: nothing was there.
+    /// The view looks through the point, which was free.
     Through,
-    /// Something was there.
+    /// The point was occupied.
     Onto,
-    /// Hidden, outside of the image, or without a reading.
+    /// The point is hidden, outside of the image, or without a reading.
     Unknown,
 }
 
 impl View {
-    /// Reduces the depth image of a frame; `None` without depth, and for a panorama.
+    /// Reduces the depth image of a frame; `None` without depth or for a panorama.
     pub fn of(item: &LogFrame) -> Option<Self> {
         let frame = &item.frame;
         let depth = frame.images().depth?;
@@ -107,23 +107,24 @@ impl View {
         reading.is_finite().then_some(f64::from(reading))
     }
 
-    /// Returns the number of pixels that cover a square metre at a distance.
+    /// Returns the number of pixels per square metre at a distance.
     pub fn pixels_per_square_metre(&self, distance_m: f64) -> f64 {
         (self.camera.focal_px() / self.step as f64 / distance_m.max(0.1)).powi(2)
     }
 
-    /// Returns the place of the camera on the floor, odometry frame, m.
+    /// Returns the position of the camera on the floor, odometry frame, m.
     pub fn eye(&self) -> Point2<f64> {
         self.odom_from_camera.translation.vector.xy().into()
     }
 
-    /// Returns the upper-body square of a person at a place, with the head's centre at a height.
+    /// Returns the upper-body square of a person at a position, with the centre of the head at a
+    /// height.
     pub fn upper_body(&self, place: Point2<f64>, head_m: f64) -> Rect {
         let in_camera = self.camera_from_odom * Point3::new(place.x, place.y, head_m);
         self.camera.upper_body(&(self.camera.robot_from_camera * in_camera))
     }
 
-    /// Returns the distance and the bearing (positive to the left) of a place from the camera, m
+    /// Returns the distance and the bearing (positive to the left) of a position from the camera, m
     /// and degrees.
     pub fn bearing_of(&self, place: Point2<f64>) -> (f64, f64) {
         let ahead = (self.odom_from_camera.rotation * Vector3::z()).xy();
@@ -133,7 +134,8 @@ impl View {
     }
 }
 
-/// Difference of depths that counts, m: growing as the noise of depth cameras does.
+/// Returns the least significant difference of depths, m, which grows like the noise of depth
+/// cameras.
 const MARGIN_M: f64 = 0.2;
 const MARGIN_GROWTH: f64 = 0.015;
 
@@ -146,18 +148,18 @@ fn reduced(depth: &DepthImage, step: usize, columns: usize, rows: usize) -> Vec<
     readings.collect()
 }
 
-/// Returns the smallest reading within one pixel of each.
+/// Returns, for each pixel, the smallest reading within one pixel.
 fn nearest(depth: &[f32], columns: usize, rows: usize) -> Vec<f32> {
     let smallest = (0..depth.len()).map(|at| {
         let xs = around(at % columns, columns);
         let cells = around(at / columns, rows).flat_map(|y| xs.clone().map(move |x| (x, y)));
-        // `min` passes over NaN, which is no reading.
+        // `min` ignores NaN, which means no reading.
         cells.map(|(x, y)| depth[y * columns + x]).fold(f32::INFINITY, f32::min)
     });
     smallest.collect()
 }
 
-/// Returns a column or a row and those beside it.
+/// Returns a column or a row and its neighbours.
 fn around(at: usize, count: usize) -> Range<usize> {
     at.saturating_sub(1)..(at + 2).min(count)
 }

@@ -1,6 +1,6 @@
 //! Share of valid readings in the region that the robot would sweep.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Point2, Vector2};
 use tagalong_core::{EgoMotion, LaserScan, RayReading};
@@ -11,6 +11,9 @@ use super::settings::NoReturn;
 
 /// Share of rays without a statement up to which those from which nothing came back may be free.
 const MOST_UNKNOWN: f64 = 0.1;
+
+/// Directions of a scan without any ray.
+const ALL_AROUND: u32 = 360;
 
 /// Statement of a sensor in one direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,14 +50,21 @@ impl Coverage {
         min_share: f64,
     ) -> Self {
         let eye: Point2<f64> = scan.robot_from_scanner.translation.vector.xy().into();
+        let no_return =
+            if settings.no_return == NoReturn::Free { Look::Seen } else { Look::Silent };
         let mut looks = Vec::with_capacity(scan.points.len() + scan.unread.len());
+        if scan.points.is_empty() && scan.unread.is_empty() {
+            // A program that leaves out rays without a reflection has left out all of them here.
+            for ray in 0..ALL_AROUND {
+                looks.push((TAU * f64::from(ray) / f64::from(ALL_AROUND), no_return));
+            }
+        }
         for point in scan.points.iter() {
             looks.push((direction(&eye, &point.xy()), Look::Seen));
         }
         for unread in scan.unread.iter() {
             let look = match unread.reading {
-                RayReading::NoReturn if settings.no_return == NoReturn::Free => Look::Seen,
-                RayReading::NoReturn => Look::Silent,
+                RayReading::NoReturn => no_return,
                 RayReading::Reflection(_) => Look::Seen,
                 // Dirt on the scanner, or a hand on it: what is behind is not seen.
                 RayReading::TooNear(_) | RayReading::Invalid => Look::Unknown,

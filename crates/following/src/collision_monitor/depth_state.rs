@@ -107,6 +107,11 @@ impl DepthState {
     pub(super) fn is_frozen(&self, identical_readings: u32) -> bool {
         self.watch.is_frozen(identical_readings)
     }
+
+    /// Returns true if the frozen camera shows an earlier time now.
+    pub(super) fn shows_past(&self, identical_readings: u32) -> bool {
+        self.watch.shows_past(identical_readings)
+    }
 }
 
 /// Adds the things in a depth image, those that are remembered, and those that hide a part of it.

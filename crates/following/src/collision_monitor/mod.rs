@@ -266,8 +266,17 @@ impl CollisionMonitor {
         if let Some(name) = self.first_frozen(0) {
             return Some((name, true));
         }
-        let most = if self.settings.noiseless { 0 } else { self.settings.identical_frames };
-        self.first_frozen(most).map(|name| (name, false))
+        self.first_frozen(self.most_identical()).map(|name| (name, false))
+    }
+
+    /// Returns true if the images are frozen and show an earlier time now.
+    pub(crate) fn shows_past(&self) -> bool {
+        self.depth.shows_past(self.most_identical())
+    }
+
+    /// Returns the number of identical readings from which on a sensor is frozen; 0 for none.
+    fn most_identical(&self) -> u32 {
+        if self.settings.noiseless { 0 } else { self.settings.identical_frames }
     }
 
     /// Returns the name of the first sensor that contradicted the odometry or, where `most` is not 0,

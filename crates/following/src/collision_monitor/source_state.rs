@@ -19,6 +19,8 @@ const BEFORE_FOOTPRINT_M: [f64; 3] = [0.1, 0.2, 0.3];
 const ON_ARC: usize = 9;
 /// Length of the way that a ray without a reflection keeps free, m, where that means free.
 const FREE_M: f64 = 6.0;
+/// Height by which a reflection may be below a level scanner, m: no mount is quite level.
+const LEVEL_M: f64 = 0.03;
 
 /// Laser scanner: between two scans the last one holds.
 #[derive(Default)]
@@ -68,7 +70,7 @@ impl ScanState {
             }
             return;
         };
-        let heights = settings.floor_m..settings.top_m;
+        let heights = least_height_m(settings, scan)..settings.top_m;
         self.points.clear();
         let low = scan.points.iter().filter(|point| heights.contains(&point.z));
         self.points.extend(low.map(Point3::xy));
@@ -104,6 +106,21 @@ impl ScanState {
     pub(super) fn coverage(&self, min_share: f64) -> Option<Coverage> {
         self.coverage.clone().map(|coverage| coverage.with_min_share(min_share))
     }
+}
+
+/// Returns the height from which on a reflection is not one of the floor, m.
+fn least_height_m(settings: &CollisionMonitorSettings, scan: &LaserScan) -> f64 {
+    let eye_m = scan.robot_from_scanner.translation.vector.z;
+    let is_above_floor = eye_m > settings.floor_m;
+    // Points whose scanner is not known may be of one of several layers, some of which meet the floor.
+    let has_layers =
+        scan.increment_rad == 0.0 && scan.points.iter().any(|point| point.z > settings.floor_m);
+    if is_above_floor || has_layers {
+        return settings.floor_m;
+    }
+    // The rays of a scanner that is as low as the floor is rough run along the floor, not into it. Where
+    // its height is not known, it is that of the robot's origin.
+    eye_m - LEVEL_M
 }
 
 /// Range sensor: sonar or infrared.

@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Vector2};
+use nalgebra::{Isometry3, Point3, Vector2, Vector3};
 use tagalong_conformance::target;
 use tagalong_core::{DepthImage, LaserScan};
 use tagalong_core::{Images, ObstacleData, ObstacleReading, RangeReading, RayReading, Stamp};
@@ -66,7 +66,11 @@ fn scan_at(frame: usize, x: f64, turn: f64, instead: impl Fn(i32) -> Option<f64>
         let noise = f64::from(noise(frame, (deg + 180) as usize));
         instead(deg).unwrap_or_else(|| wall_m(x, angle + turn) + noise)
     });
-    let mount = Isometry3::translation(0.0, 0.0, 0.2);
+    scan_of(Isometry3::translation(0.0, 0.0, 0.2), ranges)
+}
+
+/// A scan of these ranges, m, one for each degree from behind the robot on.
+fn scan_of(mount: Isometry3<f64>, ranges: impl IntoIterator<Item = f64>) -> LaserScan {
     LaserScan::of_ranges(mount, -std::f64::consts::PI, 1.0_f64.to_radians(), [0.1, 8.0], ranges)
 }
 
@@ -113,10 +117,31 @@ fn the_same_depth_image_again_is_frozen_and_a_noisy_one_is_not() {
     assert_eq!(reasons[3], None);
     assert!(reasons[4..].iter().all(|reason| *reason == Some(Reason::Frozen)), "{reasons:?}");
     assert_eq!(monitor.frozen_sensor(), Some(("the depth image".into(), false)));
+    assert!(monitor.shows_past());
     let frame = frame(29, EgoMotion::at_rest(0.1), Some(depth_at(29, 0.0, 0.0)), None);
     monitor.update(&frame, &frame.motion, &[], None);
     assert_eq!(monitor.stop_reason(0.5), None, "it goes on");
-    assert_eq!(monitor.frozen_sensor(), None);
+    assert_eq!((monitor.frozen_sensor(), monitor.shows_past()), (None, false));
+}
+
+/// The stop of a camera that contradicted the odometry lasts, and its images do not show the past for ever.
+#[test]
+fn images_that_are_new_again_show_the_present_while_the_stop_lasts() {
+    let mut monitor = settled();
+    let same = depth_at(20, 0.0, 0.0);
+    let moving = EgoMotion { forward: 0.1, ..EgoMotion::at_rest(0.1) };
+    for index in 20..30 {
+        let frame = frame(index, moving, Some(same.clone()), None);
+        monitor.update(&frame, &frame.motion, &[], None);
+    }
+    let frozen = Some(("the depth image".to_owned(), true));
+    assert_eq!((monitor.frozen_sensor(), monitor.shows_past()), (frozen.clone(), true));
+    for index in 30..33 {
+        let depth = depth_at(index, 1.0, 0.0);
+        let frame = frame(index, EgoMotion::at_rest(0.1), Some(depth), None);
+        monitor.update(&frame, &frame.motion, &[], None);
+        assert_eq!((monitor.frozen_sensor(), monitor.shows_past()), (frozen.clone(), false));
+    }
 }
 
 #[test]
@@ -278,6 +303,86 @@ fn rays_that_say_nothing_ahead_stop_the_robot() {
         let allowed = monitor.allowance(AHEAD, 0.9, &BRAKING);
         assert_eq!((allowed.most, allowed.stops), (0.0, Reason::Unknown), "{instead}");
     }
+}
+
+/// Returns the largest speed ahead after two seconds of such scans, each moved by a trifle as noise
+/// does, without another sensor.
+fn speed_by(scan: &LaserScan) -> f64 {
+    let mut monitor = monitor();
+    for index in 0..20 {
+        let off = Vector3::new(1e-4 * (index % 3) as f64, 0.0, 0.0);
+        let points: Vec<Point3<f64>> = scan.points.iter().map(|at| at + off).collect();
+        let scan = LaserScan::of_points(points).with_scanner(scan.robot_from_scanner).with_rays(
+            scan.first_rad,
+            scan.increment_rad,
+            scan.rays.to_vec(),
+        );
+        let frame = frame(index, EgoMotion::at_rest(0.1), None, Some(scan));
+        monitor.update(&frame, &frame.motion, &[], None);
+    }
+    assert_eq!(monitor.stop_reason(0.5), None);
+    speed(&monitor)
+}
+
+/// Its rays run along the floor and not into it: also at the origin of the robot, as points of two
+/// coordinates are and a scanner that is not in tf.
+#[test]
+fn a_scanner_that_is_as_low_as_the_floor_is_rough_sees_obstacles() {
+    fn scan_at_height(height_m: f64, nods_rad: f64) -> LaserScan {
+        let ranges = (-180..180).map(|deg: i32| if deg.abs() < 20 { 0.5 } else { 3.0 });
+        scan_of(nodding(height_m, nods_rad), ranges)
+    }
+
+    for height_m in [-0.1, 0.0, 0.04, 0.08, 0.2] {
+        for nods_rad in [0.0, 0.02] {
+            let speed_mps = speed_by(&scan_at_height(height_m, nods_rad));
+            assert_eq!(speed_mps, 0.0, "{height_m} m above the floor, {nods_rad} rad");
+        }
+    }
+    let flat = scan_at_height(0.0, 0.0).points.to_vec();
+    assert_eq!(speed_by(&LaserScan::of_points(flat)), 0.0);
+}
+
+/// The mount of a scanner above the middle of the robot that looks down by an angle.
+fn nodding(height_m: f64, nods_rad: f64) -> Isometry3<f64> {
+    Isometry3::new(Vector3::new(0.0, 0.0, height_m), Vector3::new(0.0, nods_rad, 0.0))
+}
+
+#[test]
+fn a_scanner_that_looks_down_and_one_of_several_layers_meet_the_floor() {
+    let ranges = (-180..180).map(|deg: i32| {
+        let ahead = f64::from(deg).to_radians().cos();
+        if deg.abs() < 70 { 0.4 / (0.35_f64.sin() * ahead) } else { 3.0 }
+    });
+    assert_eq!(speed_by(&scan_of(nodding(0.4, 0.35), ranges)), Allowance::FREE.most);
+    let mut points = Vec::new();
+    for deg in -180..180 {
+        let angle = f64::from(deg).to_radians();
+        points.push(Point3::new(0.6 * angle.cos(), 0.6 * angle.sin(), 0.01));
+        points.push(Point3::new(3.0 * angle.cos(), 3.0 * angle.sin(), 0.4));
+    }
+    assert_eq!(speed_by(&LaserScan::of_points(points)), Allowance::FREE.most);
+}
+
+/// A program that leaves out the rays without a reflection gives a scan without any.
+#[test]
+fn a_scan_without_any_ray_is_no_free_way() {
+    fn allowed(no_return: NoReturn, has_depth: bool) -> Allowance {
+        let default = CollisionMonitorSettings::default();
+        let mut monitor = monitor_of(CollisionMonitorSettings { no_return, ..default });
+        for index in 0..20 {
+            let depth = has_depth.then(|| depth_at(index, 0.0, 0.0));
+            let nothing = LaserScan::of_points(Vec::new());
+            let frame = frame(index, EgoMotion::at_rest(0.1), depth, Some(nothing));
+            monitor.update(&frame, &frame.motion, &[], None);
+        }
+        monitor.allowance(AHEAD, 0.9, &BRAKING)
+    }
+
+    let alone = allowed(NoReturn::Unknown, false);
+    assert_eq!((alone.most, alone.stops), (0.0, Reason::Unknown));
+    assert_eq!(allowed(NoReturn::Unknown, true), Allowance::FREE, "a camera sees there");
+    assert_eq!(allowed(NoReturn::Free, false), Allowance::FREE, "in those words");
 }
 
 /// Between two scans the robot moves towards what the last one met; one ray may be dust, and what is

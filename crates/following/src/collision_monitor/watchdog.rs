@@ -42,6 +42,8 @@ pub(super) struct Watch<R> {
     /// True once enough of them did: a robot that stands cannot be contradicted, so this holds until
     /// the watch is set up anew.
     is_contradicted: bool,
+    /// True once the readings were new again after that.
+    is_new_again: bool,
 }
 
 impl<R> Default for Watch<R> {
@@ -52,6 +54,7 @@ impl<R> Default for Watch<R> {
             reference: None,
             contradictions: 0,
             is_contradicted: false,
+            is_new_again: false,
         }
     }
 }
@@ -60,6 +63,12 @@ impl<R> Watch<R> {
     /// Returns true if the sensor has repeated itself so many times, or contradicted the odometry.
     pub(super) fn is_frozen(&self, identical_readings: u32) -> bool {
         self.is_contradicted || identical_readings > 0 && self.repeated >= identical_readings
+    }
+
+    /// Returns true if a frozen sensor shows an earlier time now: not once it delivers new readings,
+    /// though a stop may last.
+    pub(super) fn shows_past(&self, identical_readings: u32) -> bool {
+        self.is_frozen(identical_readings) && !self.is_new_again
     }
 
     /// Forgets the pose of the reference, after a jump of the clock, but not what was found.
@@ -82,7 +91,11 @@ impl<R> Watch<R> {
             Some(false) => 0,
             None => self.contradictions,
         };
-        self.is_contradicted |= self.contradictions >= IN_A_ROW;
+        if self.contradictions >= IN_A_ROW {
+            self.is_contradicted = true;
+            self.is_new_again = false;
+        }
+        self.is_new_again |= contradicts == Some(false);
     }
 
     /// Takes in readings, bit for bit: real ones have noise.
@@ -107,7 +120,14 @@ impl<R> Watch<R> {
             is_same = false;
             self.previous.truncate(count);
         }
-        self.repeated = if is_same && count > 0 { self.repeated.saturating_add(1) } else { 0 };
+        if is_same && count > 0 {
+            self.repeated = self.repeated.saturating_add(1);
+            self.is_new_again = false;
+        } else {
+            // Readings that never were the same have noise, and say nothing by being different.
+            self.is_new_again |= self.repeated > 0;
+            self.repeated = 0;
+        }
     }
 
     /// Returns the motion since the reference, if that is enough to compare.

@@ -87,6 +87,8 @@ impl Aim {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Orders {
     last: Option<Command>,
+    /// True if a frame ended the last command before its time.
+    is_withdrawn: bool,
     fault: Option<&'static str>,
     valid_s: f64,
     /// Time at which the frame of the last command was processed. Stamps tell nothing of a sensor
@@ -113,6 +115,7 @@ impl Orders {
         let reason = match self.last {
             _ if self.fault.is_some() => Reason::Fault,
             None => Reason::Settling,
+            Some(_) if self.is_withdrawn => Reason::Expired,
             Some(last) if is_young && self.is_near(last.stamp, now) && now <= last.valid_until => {
                 return last;
             }
@@ -136,12 +139,16 @@ pub(crate) struct CommandLimiter {
     /// Largest speed that another program allows, m/s.
     allowed_mps: f64,
     last: Option<Command>,
+    /// True if a frame ended the last command before its time.
+    is_withdrawn: bool,
     /// Motion of the last command.
     motion: Motion,
     fault: Option<&'static str>,
     /// Time of the last command.
     made: Instant,
     response: ResponseCheck,
+    /// True while the base executes the commands.
+    is_driving: bool,
     /// Time from an image to wheels that move accordingly, s: the set one, or the measured one if that
     /// is longer.
     reaction_s: f64,
@@ -179,10 +186,12 @@ impl CommandLimiter {
             robot,
             allowed_mps: f64::INFINITY,
             last: None,
+            is_withdrawn: false,
             motion: Motion::default(),
             fault: None,
             made: Instant::now(),
             response: ResponseCheck::default(),
+            is_driving: false,
             late: None,
             is_odometry_old: false,
         }
@@ -207,14 +216,24 @@ impl CommandLimiter {
         // Stops are remembered, too: the ramp of the next command starts from this one.
         self.response.add(&command);
         self.last = Some(command);
+        self.is_withdrawn = false;
         self.made = Instant::now();
         command
+    }
+
+    /// Ends the last command at the time of a frame that leads to none: the wheels stop, and the next
+    /// command starts from there.
+    pub(crate) fn withdraw(&mut self, at: Stamp) {
+        self.motion = Motion::default();
+        self.is_withdrawn = true;
+        self.response.withdraw(at);
     }
 
     /// Returns the command state that holds until the next frame.
     pub(crate) fn orders(&self) -> Orders {
         Orders {
             last: self.last,
+            is_withdrawn: self.is_withdrawn,
             fault: self.fault,
             valid_s: self.settings.valid_s,
             made: self.made,
@@ -262,8 +281,13 @@ impl CommandLimiter {
         }
     }
 
-    /// Tells whether the base executes the commands: only then are they compared with the odometry.
+    /// Tells whether the base executes the commands: only then are they compared with the odometry. A
+    /// base that begins to execute them starts from rest, whatever the commands before were.
     pub(crate) fn set_driving(&mut self, is_driving: bool) {
+        if is_driving && !self.is_driving {
+            self.motion = Motion::default();
+        }
+        self.is_driving = is_driving;
         self.response.set_driving(is_driving && self.settings.check_response);
     }
 
@@ -293,6 +317,7 @@ impl CommandLimiter {
     pub(crate) fn arm(&mut self) {
         self.fault = None;
         self.last = None;
+        self.is_withdrawn = false;
         self.motion = Motion::default();
         self.response.clear();
     }

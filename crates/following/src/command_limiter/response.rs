@@ -85,6 +85,13 @@ impl ResponseCheck {
         *self = Self { is_driving: self.is_driving, ..Self::default() };
     }
 
+    /// Ends the newest command: the base was told to stop then.
+    pub(super) fn withdraw(&mut self, at: Stamp) {
+        if let Some(last) = self.commands.back_mut() {
+            last.valid_until = last.valid_until.min(at);
+        }
+    }
+
     /// Adds the newest command.
     pub(super) fn add(&mut self, command: &Command) {
         fn oldest(commands: &VecDeque<Command>) -> Option<Stamp> {

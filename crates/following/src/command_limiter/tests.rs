@@ -132,6 +132,20 @@ fn speed_grows_no_faster_than_it_may() {
     assert!((slower - (0.8 - 1.0 * PERIOD_S)).abs() < 1e-9, "{slower}");
 }
 
+/// Before the enable no command is executed, however fast they are.
+#[test]
+fn a_base_that_begins_to_execute_the_commands_starts_from_rest() {
+    let (mut limiter, unheard) = at_speed(0.8, 0.8);
+    assert!(unheard.wheels.left > 0.79, "{unheard:?}");
+    let mut before = 0.0;
+    for frame in 40..45 {
+        limiter.set_driving(true);
+        let speed = limiter.limit(&wish(frame, 0.8, 0.8), free).wheels.left;
+        assert!((speed - before - 0.5 * PERIOD_S).abs() < 1e-9, "{frame}: {before} {speed}");
+        before = speed;
+    }
+}
+
 #[test]
 fn each_emergency_stops_at_once() {
     type Change = fn(Wish) -> Wish;
@@ -343,6 +357,21 @@ fn commands_expire() {
     }
     let nothing_yet = limiter().orders().at(Stamp::from_nanos(5));
     assert_eq!(nothing_yet.wheels, WheelSpeeds::STOP);
+}
+
+#[test]
+fn a_withdrawn_command_is_a_stop_from_which_the_robot_starts_anew() {
+    let (mut limiter, command) = at_speed(0.8, 0.8);
+    let soon = command.stamp.plus_seconds(0.1);
+    limiter.withdraw(soon);
+    for at in [command.stamp, soon] {
+        let order = limiter.orders().at(at);
+        assert_eq!((order.wheels, order.reason), (WheelSpeeds::STOP, Reason::Expired));
+    }
+    let next = Wish { stamp: command.stamp.plus_seconds(0.2), ..wish(0, 0.8, 0.8) };
+    let started = limiter.limit(&next, free);
+    assert!((0.01..0.11).contains(&started.wheels.left), "{started:?}");
+    assert_eq!(limiter.orders().at(started.stamp), started);
 }
 
 #[test]

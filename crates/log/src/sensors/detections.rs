@@ -15,6 +15,7 @@ use crate::msgs::{
 };
 use crate::pairing::{Payload, Waiting};
 use crate::tally::Tally;
+use crate::topics::is_unusual;
 use crate::walk::{Channel, Message};
 
 const BOXES: &str = "vision_msgs/Detection2DArray";
@@ -66,6 +67,8 @@ struct Recorded {
     /// Number of messages that were read, and of those that were matched with a frame.
     read: u64,
     used: u64,
+    /// Number of frames.
+    frames: u64,
 }
 
 impl Recorded {
@@ -104,6 +107,7 @@ impl SensorReader for Recorded {
     }
 
     fn pair(&mut self, stamp: Stamp, next: Option<Stamp>, tolerance_s: f64) {
+        self.frames += 1;
         self.paired = self.waiting.take(stamp, next, tolerance_s);
         self.used += u64::from(self.paired.is_some());
     }
@@ -144,6 +148,12 @@ impl SensorReader for Recorded {
                     "{topic}: none of the {read} messages belongs to a frame, so no person is detected"
                 )
             });
+        }
+        let Self { used, frames, .. } = self;
+        if *used > 0 && is_unusual(*frames - *used, *frames) {
+            tally.note(format!(
+                "{topic} has messages for {used} of {frames} images: tracks are predicted in the others"
+            ));
         }
     }
 }

@@ -6,13 +6,15 @@ use nalgebra::{Isometry2, Isometry3, Point3};
 use tagalong_core::{
     FurtherScans, Input, LaserScan as Scan, RayReading, Sensors, Stamp, UnreadRay, spatial_pose,
 };
+use tagalong_math::counted;
 
-use super::recent::Recent;
+use super::recent::{NEAR_S, Recent};
 pub(crate) use super::scan_faults::scan_fault;
 use super::sweep::{note_impossible_times, sweep_motion};
 use super::{Moment, SensorReader, SensorType};
 use crate::msgs::{CdrError, LaserScan, decode};
 use crate::tally::Tally;
+use crate::topics::is_unusual;
 use crate::walk::Message;
 
 /// Entry of laser scanners.
@@ -40,6 +42,12 @@ pub(crate) struct Scans {
     recent: Recent<LaserScan, KEPT>,
     /// True for an additional scanner of the robot.
     is_further: bool,
+    /// Number of scans, and of those without one range between their limits.
+    scans: u64,
+    blind: u64,
+    /// Number of frames, and of those with a scan near in time.
+    frames: u64,
+    near: u64,
 }
 
 impl SensorReader for Scans {
@@ -47,9 +55,18 @@ impl SensorReader for Scans {
         let scan = decode(message.data)?;
         match scan_fault(&scan) {
             Some(why) => lose_scan(&message.channel.topic, &why, tally),
-            None => self.recent.push(scan),
+            None => {
+                self.scans += 1;
+                self.blind += u64::from(points(&scan).next().is_none());
+                self.recent.push(scan);
+            }
         }
         Ok(())
+    }
+
+    fn pair(&mut self, stamp: Stamp, _: Option<Stamp>, _: f64) {
+        self.frames += 1;
+        self.near += u64::from(self.recent.near(stamp).is_some());
     }
 
     fn add_to(&self, sensors: Sensors, moment: &Moment<'_>, tally: &mut Tally) -> Sensors {
@@ -63,6 +80,19 @@ impl SensorReader for Scans {
         match seen {
             Some(seen) => sensors.with(seen),
             None => sensors,
+        }
+    }
+
+    fn close(&mut self, topic: &str, tally: &mut Tally) {
+        let Self { scans, blind, frames, near, .. } = *self;
+        if scans > 0 && blind == scans {
+            tally.note(format!(
+                "{topic}: none of its {} has a range between range_min and range_max",
+                counted(scans, "scan")
+            ));
+        }
+        if near > 0 && is_unusual(frames - near, frames) {
+            tally.note(format!("{topic} has scans within {NEAR_S} s of {near} of {frames} frames"));
         }
     }
 }

@@ -107,7 +107,7 @@ impl Assembly {
                     && let Some(words) = slower_words(&plan.scan, plan.primary(), topic)
                 {
                     let name = input.name();
-                    self.tally.note(format!(
+                    self.tally.tell_frameless(format!(
                         "{without} of {frames} images make no frame, because no image of {topic} \
                          belongs to them: {words}; record that topic at their rate, or take a \
                          pipeline without {name}"

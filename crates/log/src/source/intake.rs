@@ -195,6 +195,7 @@ impl Intake {
 
     fn take_frame(&mut self, image: Payload, tally: &mut Tally) {
         let newest = self.frames.last();
+        let stamp = image.stamp;
         self.newest = self.newest.max(Some(image.stamp));
         match self.frames.push(image) {
             Arrival::Queued | Arrival::Suspect => {}
@@ -215,7 +216,10 @@ impl Intake {
             }
             Arrival::LateBefore => tally.count("late_frames"),
             Arrival::Jumped => {
-                tally.count("time_jumps_back");
+                let topic = self.primary.clone();
+                tally.remark("time_jumps_back", || {
+                    format!("the stamps of {topic} are set back to {stamp}: all tracks end there")
+                });
                 self.newest = self.frames.newest();
                 self.watch.clock_jumps();
                 // Partners with stamps before the newest image belong to the new time already.

@@ -193,6 +193,17 @@ impl FrameSource {
         &self.assembly.tally.notes
     }
 
+    /// Returns the remarks about what was lost, each one once. They are among [`FrameSource::notes`].
+    pub fn losses(&self) -> &[String] {
+        &self.assembly.tally.losses
+    }
+
+    /// Returns the remarks on images that make no frame although nothing was lost. They are among
+    /// [`FrameSource::notes`], and there are none before the end of the log.
+    pub fn frameless(&self) -> &[String] {
+        &self.assembly.tally.frameless
+    }
+
     /// Returns true if some part of the log could not be used because it is damaged.
     pub fn data_lost(&self) -> bool {
         self.assembly.tally.lost

@@ -169,7 +169,7 @@ impl Plan {
 pub(super) fn tally_of(scan: &Scan) -> Tally {
     let mut tally =
         Tally { counters: scan.counters.clone(), lost: scan.data_lost, ..Tally::default() };
-    scan.notes.iter().for_each(|note| tally.note(note.clone()));
+    scan.notes.iter().for_each(|note| tally.note_loss(note.clone()));
     if scan.counters.contains_key("chunks_without_crc") {
         tally.note("crc: absent; damage inside the chunks of this file may go unnoticed");
     }

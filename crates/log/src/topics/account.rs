@@ -21,7 +21,7 @@ pub struct TopicUse {
     /// Reason why the topic is not used, or why its use fails.
     pub problem: Option<String>,
     /// Input for which the topic could be used if the problem were solved and no other topic were
-    /// used for it.
+    /// used for it; also `laser` for a scanner beside others.
     pub could_be: Option<&'static str>,
     /// Setting or action that solves the problem.
     pub remedy: Option<String>,
@@ -58,7 +58,8 @@ impl InputAccount {
         names
     }
 
-    /// Yields the topics that could be used for a missing input if their problem were solved.
+    /// Yields the topics that could be used for a missing input, or as a further scanner, if their
+    /// problem were solved.
     pub fn curable(&self) -> impl Iterator<Item = &TopicUse> {
         self.topics.iter().filter(|topic| topic.could_be.is_some())
     }

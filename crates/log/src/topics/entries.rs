@@ -102,6 +102,9 @@ impl Judge<'_> {
         if unused_odometry.iter().any(|(unused, _)| unused == name) {
             return (odometry.is_none() && odom_frames.is_none()).then_some("odometry");
         }
+        if self.is_broken_scanner(name, topic) {
+            return Some(Input::Laser.name());
+        }
         let parts = TopicName::of(name);
         let is_scan = topic.kind == Type::PointCloud || topic.schema.ends_with("LaserScan");
         let is_depth = topic.content == Content::Depth || topic.is_jpeg_depth || topic.is_deep_grey;
@@ -113,6 +116,16 @@ impl Judge<'_> {
         }
         let is_free = self.inputs.uses(Input::Colour) && colour.is_none();
         (unreadable(topic).is_some() && is_free && !is_scan).then_some("colour")
+    }
+
+    /// Returns true for a scanner beside the first one that would be used too, if nothing were wrong.
+    fn is_broken_scanner(&self, name: &str, topic: &Topic) -> bool {
+        let Some(first) = self.chosen.sensor(Input::Laser) else { return false };
+        let is_scanner =
+            SENSORS.iter().any(|sensor| sensor.input == Input::Laser && is_of(sensor, topic));
+        let is_left = self.use_of(name).is_none() && self.input.laser_topic.is_none();
+        // Of two topics with one frame, one is enough.
+        is_scanner && is_left && self.scan.frame_of(first) != self.scan.frame_of(name)
     }
 
     /// Returns the first of the inputs of messages of another type for which nothing else is used.

@@ -4,7 +4,7 @@
 use nalgebra::Point3;
 use tagalong_core::{Command, EgoMotion, Frame, Images, Reason, Stamp, Track, WheelSpeeds};
 
-use super::doubles::{PLAIN, World, camera, frame, person, scored, with_eyes};
+use super::doubles::{PLAIN, World, camera, frame, hall, person, scored, with_eyes};
 use crate::{LockState, Pipeline};
 
 /// A pipeline that has followed a person for two seconds.
@@ -98,9 +98,8 @@ fn c1_another_calibration_freezes_the_tracks_and_holds_the_robot() {
 fn who_is_in_the_laser_scan_alone_is_not_driven_into() {
     let (_, mut pipeline) = driving("");
     let shins = [Point3::new(0.5, 0.3, 0.2), Point3::new(0.5, 0.15, 0.2)];
-    for (index, laser, reason) in [(21, &shins[..], Reason::Blocked), (22, &[], Reason::Limited)] {
-        let frame = frame(index, index as f64 * 0.1)
-            .with_laser(Some(tagalong_core::LaserScan::of_points(laser)));
+    for (index, laser, reason) in [(21, &shins[..], Reason::TooClose), (22, &[], Reason::Limited)] {
+        let frame = frame(index, index as f64 * 0.1).with_laser(Some(hall(index, laser)));
         let report = pipeline.step(&frame).unwrap();
         let command = report.command.unwrap();
         assert_eq!(command.reason, reason, "{index}");

@@ -42,10 +42,22 @@ pub fn bare_frame(index: u64, t_s: f64) -> Frame {
     Frame::new(index, stamp, Arc::new(camera()), motion, Images::default())
 }
 
-/// Adds the scan of a laser that meets nothing: without a sensor of obstacles no robot moves.
+/// Adds the scan of a laser in a hall: without a sensor of obstacles no robot moves.
 pub fn with_eyes(frame: Frame) -> Frame {
-    let none: [Point3<f64>; 0] = [];
-    frame.with_laser(Some(LaserScan::of_points(none)))
+    let scan = hall(frame.index, &[]);
+    frame.with_laser(Some(scan))
+}
+
+/// Returns the scan of a laser that meets these points and the walls of a hall, with noise: a scan that
+/// is the same again and again is frozen.
+pub fn hall(index: u64, things: &[Point3<f64>]) -> LaserScan {
+    let wall_m = 9.0 + 0.01 * (index % 5) as f64;
+    let mut points = things.to_vec();
+    for ray in 0..120 {
+        let angle = f64::from(ray) * 3.0_f64.to_radians();
+        points.push(Point3::new(wall_m * angle.cos(), wall_m * angle.sin(), 0.2));
+    }
+    LaserScan::of_points(points)
 }
 
 /// A person 1.6 m tall (to the head's centre) at a place on the floor.

@@ -1,13 +1,14 @@
 //! A pipeline receives the inputs that it declares, and no others.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use tagalong_core::{
     Capabilities, DepthImage, Detection, Detector, Frame, Funnel, GreyImage, Images, Input, Inputs,
     Query, Reason, Result, RgbImage, RightImage, Sensor, WheelSpeeds,
 };
 
-use super::doubles::{Config, PLAIN, World, frame, person};
+use super::doubles::{Config, PLAIN, World, frame, person, scored};
 use crate::{FrameReport, Pipeline, StepError};
 
 fn world() -> World {
@@ -132,17 +133,37 @@ fn a_frame_without_a_required_input_is_refused_alone() {
     assert!((predicted[0].forward - 0.75).abs() < 1e-12 && (predicted[0].dt - 0.3).abs() < 1e-9);
 }
 
+/// The robot stands from the refused frame on, though the last command would hold, until the next frame.
 #[test]
-fn a_refused_frame_gives_no_command_and_the_last_one_expires() {
-    let config = format!("{}\n[controller]\nplugin = 'drive'", script("depth"));
-    let mut pipeline = world().pipeline(&config);
-    let command = pipeline.step(with_depth(1)).unwrap().command.unwrap();
-    let late = command.valid_until.plus_seconds(0.01);
-    let refused = frame(2, late.seconds_since(frame(0, 0.0).stamp));
-    pipeline.step(refused).unwrap_err();
-    let stopped = pipeline.command_at(late).unwrap();
+fn a_refused_frame_gives_no_command_and_ends_the_last_one() {
+    fn bare(index: u64) -> Frame {
+        frame(index, index as f64 * 0.1)
+    }
+
+    fn whole(index: u64) -> Frame {
+        bare(index).with_depth(Arc::new(DepthImage::filled(640, 480, 8.0)))
+    }
+
+    let rules = "[controller]\nplugin = 'drive'\n[collision_monitor]\nnoiseless = true\n";
+    let config = format!("{}\n{rules}", script("depth"));
+    let world = World::of((0..30).map(|_| vec![scored(5.0, person(3.0, 0.0))]));
+    let mut pipeline = world.pipeline(&config);
+    let mut last = None;
+    for index in 1..=20 {
+        last = pipeline.step(whole(index)).unwrap().command;
+    }
+    let late = bare(21).stamp;
+    let command = last.unwrap();
+    assert_ne!(command.wheels, WheelSpeeds::STOP, "{:?}", command.reason);
+    assert_eq!(pipeline.command_after(late, Duration::ZERO), Some(command));
+    pipeline.step(bare(21)).unwrap_err();
+    let stopped = pipeline.command_after(late, Duration::ZERO).unwrap();
     assert_eq!((stopped.wheels, stopped.reason), (WheelSpeeds::STOP, Reason::Expired));
-    let jumped = frame(3, 0.9).with_odometry_jump(true);
+    assert_eq!(pipeline.status().unwrap().command, "expired");
+    let next = pipeline.step(whole(22)).unwrap().command.unwrap();
+    assert_ne!(next.wheels, WheelSpeeds::STOP, "{:?}", next.reason);
+    assert_eq!(pipeline.command_after(late, Duration::ZERO), Some(next));
+    let jumped = bare(23).with_odometry_jump(true);
     pipeline.step(jumped).unwrap_err();
     assert_eq!(pipeline.fault(), Some("odometry jumped"), "also in a refused frame");
 }

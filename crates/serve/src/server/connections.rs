@@ -1,6 +1,6 @@
-//! Open connections: one thread reads requests and writes answers in turn and waits for none of
-//! them. Only a request that is whole gets a thread, so a client that is slow to send or to read
-//! costs a buffer.
+//! Open connections. One thread reads all requests and writes all answers without blocking. Only a
+//! complete request gets its own thread, so that a client that sends or reads slowly only costs a
+//! buffer.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -13,20 +13,22 @@ use std::time::{Duration, Instant};
 use super::{Guard, Site};
 use crate::http::{Incoming, Request, Response};
 
-/// Open connections at once. For one more, that which has waited longest is closed, so that slow
-/// clients lock no other out. In a test both ends are files of one process, and 1024 are usual.
+/// Largest number of open connections. For a further one, the connection that has waited longest is
+/// closed, so that slow clients cannot lock others out. In a test both ends are file descriptors of
+/// one process, whose usual limit is 1024.
 pub(super) const CONNECTIONS: usize = if cfg!(test) { 200 } else { 512 };
 
-/// Requests that are answered at once, each in a thread.
+/// Largest number of requests that are answered at the same time, each in a thread.
 pub(super) const THREADS: usize = 32;
 
-/// Connections that are accepted in one turn.
+/// Largest number of connections that are accepted in one turn.
 const ACCEPTED_IN_A_TURN: usize = 128;
 
-/// Times that a client has.
+/// Time limits for a client.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
-    /// Longest wait for the next bytes of a request, or for a client to read the next ones.
+    /// Longest wait for the next bytes of a request, or for a client to read the next bytes of an
+    /// answer.
     pub(super) silence: Duration,
     /// Time for a whole request, and then for a free thread.
     pub(super) request: Duration,
@@ -44,10 +46,10 @@ impl Default for Limits {
     }
 }
 
-/// Longest pause between two looks at a silent connection.
+/// Longest pause between two polls of a silent connection.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Parts of a request that are read in one turn.
+/// Largest number of parts of a request that are read in one turn.
 const PARTS_IN_A_TURN: usize = 8;
 
 /// Starts a thread.
@@ -56,13 +58,13 @@ pub(super) type StartThread = fn(Box<dyn FnOnce() + Send>) -> io::Result<()>;
 /// All open connections of a server.
 pub(super) struct Connections<S> {
     open: Vec<Connection>,
-    /// Answers that their clients did not take at once.
+    /// Answers that were not sent at once.
     unsent: Receiver<Connection>,
     desk: Arc<Desk<S>>,
     start: StartThread,
 }
 
-/// Things that the threads of answers share.
+/// State that the answering threads share.
 struct Desk<S> {
     guard: Arc<Guard>,
     site: Arc<S>,
@@ -80,7 +82,7 @@ impl<S: Site> Connections<S> {
         Self { open: Vec::new(), unsent, desk, start }
     }
 
-    /// Accepts the connections that wait; returns true if there was one.
+    /// Accepts all waiting connections; returns true if there was one.
     pub(super) fn accept(&mut self, listener: &TcpListener) -> bool {
         for count in 0..ACCEPTED_IN_A_TURN {
             match listener.accept() {
@@ -92,7 +94,8 @@ impl<S: Site> Connections<S> {
                             | ErrorKind::Interrupted
                             | ErrorKind::ConnectionAborted
                     );
-                    // The process has no more files: a slow client gives its one up.
+                    // The process has no more file descriptors, so that the connection of a slow
+                    // client is closed.
                     return count > 0 || !is_passing && self.close_oldest();
                 }
             }
@@ -119,7 +122,8 @@ impl<S: Site> Connections<S> {
         oldest.map(|at| self.open.swap_remove(at)).is_some()
     }
 
-    /// Goes on with every connection as far as that needs no waiting; returns true if one moved.
+    /// Advances every connection as far as possible without waiting; returns true if one made
+    /// progress.
     pub(super) fn turn(&mut self) -> bool {
         self.open.extend(self.unsent.try_iter());
         let now = Instant::now();
@@ -147,7 +151,7 @@ impl<S: Site> Connections<S> {
         }
     }
 
-    /// Answers a request in a thread, or here where no thread can be started.
+    /// Answers a request in a new thread, or in this one if no thread can be started.
     fn answer(&self, stream: TcpStream, request: Request) {
         let seat = Seat::take(&self.desk.busy);
         let job = Job { stream, request, desk: Arc::clone(&self.desk), _seat: seat };
@@ -161,7 +165,7 @@ impl<S: Site> Connections<S> {
         let left =
             if started.is_ok() { hand_over.send(job).map_err(|unsent| unsent.0) } else { Err(job) };
         if let Err(job) = left {
-            // A mistake of the site must not end the server.
+            // A panic of the site must not end the server.
             let _ = catch_unwind(AssertUnwindSafe(|| job.run()));
         }
     }
@@ -171,13 +175,13 @@ impl<S: Site> Connections<S> {
         self.open.is_empty() && self.desk.busy.load(Ordering::Acquire) == 0
     }
 
-    /// Closes the connections whose requests are not whole.
+    /// Closes the connections whose requests are incomplete.
     pub(super) fn close_unread(&mut self) {
         self.open.retain(|connection| !matches!(connection.work, Work::Reading(_)));
     }
 }
 
-/// A request with its connection, to be answered.
+/// Complete request with its connection, which waits for an answer.
 struct Job<S> {
     stream: TcpStream,
     request: Request,
@@ -193,7 +197,7 @@ impl<S: Site> Job<S> {
         let mut connection = Connection::new(stream, Work::Writing { bytes, sent: 0 });
         // Most answers fit into the buffers of the system.
         if connection.go_on(Instant::now(), &desk.guard) != Step::Ends {
-            // A server that has ended sends no more.
+            // A server that has ended sends nothing more.
             let _ = desk.unsent.send(connection);
         }
     }
@@ -203,32 +207,32 @@ impl<S: Site> Job<S> {
 struct Connection {
     stream: TcpStream,
     work: Work,
-    /// Begin of this work, ...
+    /// Start of this work.
     since: Instant,
-    /// ... its last progress, ...
+    /// Time of the last progress.
     moved: Instant,
-    /// ... and the last look for more.
+    /// Time of the last poll.
     looked: Instant,
 }
 
 /// State of a connection.
 enum Work {
-    /// The request is not whole.
+    /// The request is incomplete.
     Reading(Incoming),
     /// The request waits for a thread.
     Whole(Request),
-    /// The answer is made.
+    /// The answer is being sent.
     Writing { bytes: Vec<u8>, sent: usize },
 }
 
 /// Result of one turn of a connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Step {
-    /// Nothing came or went.
+    /// No byte was read or written.
     Waits,
-    /// Something did.
+    /// Bytes were read or written.
     Moves,
-    /// There is nothing more to do.
+    /// The connection is finished.
     Ends,
 }
 
@@ -238,7 +242,7 @@ impl Connection {
         Self { stream, work, since: now, moved: now, looked: now }
     }
 
-    /// Returns true if it is time for a look: silent connections get fewer.
+    /// Returns true if it is time for a poll; silent connections are polled less often.
     fn is_due(&self, now: Instant) -> bool {
         let silence = now.saturating_duration_since(self.moved);
         now.saturating_duration_since(self.looked) >= (silence / 8).min(LOOK)
@@ -298,7 +302,7 @@ impl Connection {
         step
     }
 
-    /// Goes on with a whole request; a refusal needs no thread.
+    /// Handles a complete request; a refusal needs no thread.
     fn admit(&mut self, now: Instant, guard: &Guard, request: Request) {
         let refusal = guard.admit(&request).err();
         self.since = now;
@@ -322,7 +326,7 @@ impl Connection {
         let mut step = Step::Waits;
         while *sent < bytes.len() {
             match self.stream.write(&bytes[*sent..]) {
-                // A browser that is gone needs no answer.
+                // A browser that has disconnected needs no answer.
                 Ok(0) => return Step::Ends,
                 Ok(count) => {
                     *sent += count;
@@ -341,7 +345,7 @@ impl Connection {
     }
 }
 
-/// Place of one answer, given back also by a thread that panics.
+/// Slot of one answer, which is also released if its thread panics.
 struct Seat(Arc<AtomicUsize>);
 
 impl Seat {

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::connections::{CONNECTIONS, THREADS};
 use super::*;
 
-/// Deadline of events that come at once, so that a server that hangs fails its test.
+/// Deadline of events that normally happen at once, so that a hanging server fails its test.
 const DEADLINE: Duration = Duration::from_secs(60);
 
 /// Times of clients that are far beyond any test: a server that waits for them hangs.
@@ -203,7 +203,8 @@ fn only_the_loopback_interface_listens_unless_told_otherwise() {
     assert!(all.bound().ip().is_unspecified());
     let port = all.bound().port();
     assert!(all.address().starts_with(&format!("http://127.0.0.1:{port}/")), "{}", all.address());
-    // Reached over any interface, by its number; a name could be that of another page.
+    // A server on all interfaces is reached by a numeric address; a name could be that of another
+    // page.
     assert!(all.guard.is_own(&format!("192.0.2.7:{port}")));
     assert!(all.guard.is_own(&format!("localhost:{port}")));
     assert!(!all.guard.is_own(&format!("robot.example:{port}")));

@@ -1,9 +1,9 @@
-//! The page of a run that happens now, for `tagalong run --serve` and the bridges.
+//! The page of a live run, for `tagalong run --serve` and the bridges.
 //!
-//! [`Live::offer`] puts a frame into the place of the newest one and returns at once; browsers are
-//! answered by threads of their own, which encode the image only when one asks for it. So a browser
-//! that is slow, silent or absent costs the pipeline nothing: it gets fewer frames, and no frame
-//! waits for it. Nothing can be changed through the page.
+//! [`Live::offer`] replaces the newest frame and returns at once; separate threads answer browsers,
+//! and encode an image only when a browser requests it. Therefore a slow, silent or absent browser
+//! does not delay the pipeline: it gets fewer frames, and no frame waits for it. Nothing can be
+//! changed through the page.
 
 mod newest;
 mod site;
@@ -27,7 +27,7 @@ use toml::Table;
 use crate::live::newest::Newest;
 use crate::live::site::Page;
 
-/// Time after the end for which browsers are told of it.
+/// Time after the end during which browsers are informed of it.
 const FAREWELL: Duration = Duration::from_millis(400);
 
 /// Server of the page of one run.
@@ -40,11 +40,12 @@ pub struct Live {
 }
 
 impl Live {
-    /// Begins to serve. `name` is that of the pipeline, `input` that of the log or the robot, and
-    /// `config` the resolved one, whose settings the page quotes with the advice of its plugins.
+    /// Starts the server. `name` is that of the pipeline, `input` that of the log or the robot, and
+    /// `config` is the resolved config, whose settings the page quotes with the advice of its
+    /// plugins.
     ///
     /// # Errors
-    /// A port that is taken, an interface that this computer does not have.
+    /// A port that is in use, or an interface that this computer does not have.
     pub fn start(
         at: SocketAddr,
         name: &str,
@@ -71,7 +72,7 @@ impl Live {
         Ok(Self { newest, address, bound, stop, thread: Some(thread) })
     }
 
-    /// Returns the address to open in a browser, which is the key to the page.
+    /// Returns the URL to open in a browser, which contains the key to the page.
     pub fn address(&self) -> &str {
         &self.address
     }
@@ -81,14 +82,14 @@ impl Live {
         self.bound
     }
 
-    /// Shows a frame from now on. Never waits for a browser.
+    /// Shows a frame until the next one. It never waits for a browser.
     pub fn offer(&self, frame: &Frame, odom_from_robot: &Isometry2<f64>, report: &FrameReport) {
         if report.outcome.is_processed() {
             self.newest.put(frame, odom_from_robot, report);
         }
     }
 
-    /// Tells the browsers that asked lately how the run ended, and ends.
+    /// Tells browsers with recent requests how the run ended, and stops the server.
     pub fn finish(mut self, ended: &str) {
         self.newest.end(ended);
         let start = Instant::now();
@@ -102,7 +103,7 @@ impl Live {
         self.newest.end("The run has ended.");
         self.stop.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
-            // A panic of the server is none of the run.
+            // A panic of the server does not affect the run.
             let _ = thread.join();
         }
     }
@@ -114,11 +115,11 @@ impl Drop for Live {
     }
 }
 
-/// Reads `PORT`, `ADDRESS` or `ADDRESS:PORT`; without an address it is this computer alone, and
+/// Reads `PORT`, `ADDRESS` or `ADDRESS:PORT`; without an address it is only this computer, and
 /// without a port a free one.
 ///
 /// # Errors
-/// A sentence with the forms that are understood.
+/// A sentence with the supported forms.
 pub fn parse_address(text: &str) -> Result<SocketAddr, String> {
     if let Ok(port) = text.parse() {
         return Ok((Ipv4Addr::LOCALHOST, port).into());

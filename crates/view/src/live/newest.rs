@@ -1,4 +1,4 @@
-//! The newest frame, and as much of the past as its trails and events need.
+//! The newest frame, and the part of the past that its trails and events need.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
@@ -19,26 +19,26 @@ use tagalong_pipeline::FrameReport;
 use tagalong_render::{background, jpeg};
 use toml::Table;
 
-/// Frames that are kept for trails and for the times of events.
+/// Number of frames that are kept for trails and for the times of events.
 const PAST_FRAMES: usize = 64;
 
-/// Time that a trail reaches back, s.
+/// Length of a trail, s.
 const TRAIL_S: f64 = 2.0;
 
-/// Events that a page which begins, or was away, still gets.
+/// Number of past events for a page that has just been opened or was disconnected.
 const EVENTS: usize = 200;
 
-/// Longest wait of a page for the next frame. In a test it is beyond all else, so that an answer is
-/// one to an event.
+/// Longest wait of a page for the next frame. In a test it exceeds all other times, so that every
+/// answer is caused by an event.
 pub(super) const WAIT: Duration = Duration::from_secs(if cfg!(test) { 120 } else { 1 });
 
-/// Time since the last question within which the page counts as watched.
+/// Time since the last request within which the page counts as watched.
 const WATCHED: Duration = Duration::from_secs(2);
 
 /// Columns and quality of JPEG.
 const IMAGE: (usize, u8) = (640, 72);
 
-/// Place for the newest frame.
+/// Slot for the newest frame.
 pub struct Newest {
     config: Table,
     remedies: Remedies,
@@ -71,7 +71,7 @@ pub struct LiveEvent {
     text: String,
 }
 
-/// One frame with everything that the page shows of it.
+/// A frame with everything that the page shows.
 struct Shot {
     seq: u64,
     t: f64,
@@ -82,11 +82,11 @@ struct Shot {
     scan: Option<Arc<[Point3<f64>]>>,
     odom_from_robot: Isometry2<f64>,
     past: Vec<Arc<FrameData>>,
-    /// Made when the first page asks.
+    /// Created when the first page requests it.
     parts: OnceLock<Parts>,
 }
 
-/// Parts of a frame that take time to make.
+/// Parts of a frame that take time to create.
 struct Parts {
     frame: FrameData,
     image: String,
@@ -110,7 +110,7 @@ pub struct Now<'a> {
 }
 
 impl Newest {
-    /// Returns an empty place. The config is the resolved one.
+    /// Creates an empty slot. The config is the resolved one.
     pub fn new(config: Table, remedies: Remedies) -> Self {
         Self { config, remedies, state: Mutex::default(), changed: Condvar::new() }
     }
@@ -119,7 +119,7 @@ impl Newest {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Puts a frame into the place of the one before. Images are shared, not copied or encoded.
+    /// Replaces the previous frame. Images are shared, not copied or encoded.
     pub fn put(&self, frame: &Frame, odom_from_robot: &Isometry2<f64>, report: &FrameReport) {
         let moment = Moment::of(report, &frame.camera, odom_from_robot);
         let tests = tests(std::iter::once(&moment.notes), &self.config, &self.remedies);
@@ -150,7 +150,7 @@ impl Newest {
         self.changed.notify_all();
     }
 
-    /// Says that no frame comes any more, and why; the first reason stays.
+    /// Ends the run with a reason; the first reason is kept.
     pub fn end(&self, why: &str) {
         let mut state = self.lock();
         state.ended.get_or_insert_with(|| why.to_owned());
@@ -158,20 +158,20 @@ impl Newest {
         self.changed.notify_all();
     }
 
-    /// Returns true if a page has asked.
+    /// Returns true if a page has sent a request.
     #[cfg(test)]
     pub(super) fn was_asked(&self) -> bool {
         self.lock().asked.is_some()
     }
 
-    /// Returns true if a page asked lately and has not been told of the end.
+    /// Returns true if a page sent a request recently and does not know of the end.
     pub fn is_watched(&self) -> bool {
         let state = self.lock();
         state.farewells == 0 && state.asked.is_some_and(|asked| asked.elapsed() < WATCHED)
     }
 
-    /// Answers with the newest frame after `after`, and waits up to a second for one. `answer` turns
-    /// it into text without holding up the pipeline.
+    /// Answers with the newest frame after `after`, and waits up to a second for it. `answer`
+    /// converts it to text without delaying the pipeline.
     pub fn answer<T>(&self, after: u64, answer: impl FnOnce(&Now<'_>) -> T) -> T {
         let (shot, events, ended) = self.wait_for(after);
         let parts = shot.as_ref().map(|shot| shot.parts.get_or_init(|| shot.make_parts()));

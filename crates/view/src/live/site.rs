@@ -1,4 +1,4 @@
-//! Pages and answers of the server; none of them changes anything.
+//! Pages and answers of the server, all of which are read-only.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use toml::Table;
 
 use crate::live::newest::Newest;
 
-/// The page and what it asks for.
+/// The page, and the answers to its requests.
 pub struct Page {
     html: String,
     style: String,
@@ -18,7 +18,7 @@ pub struct Page {
 }
 
 impl Page {
-    /// Makes the page.
+    /// Creates the page.
     ///
     /// # Errors
     /// Names that JSON cannot express.

@@ -142,7 +142,7 @@ fn browsers_that_do_not_read_cost_the_pipeline_nothing() {
     offer(&live, 1);
     let host = live.bound();
     let key = live.address().split('/').nth(3).unwrap();
-    // More than the server answers at once; none of them reads a byte.
+    // More requests than the server answers at once; none of the clients reads a byte.
     let silent: Vec<TcpStream> = (0..40)
         .map(|_| {
             let mut stream = TcpStream::connect(host).unwrap();

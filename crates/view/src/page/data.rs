@@ -1,4 +1,4 @@
-//! Data of the page, as its script reads it.
+//! Data of the page, in the format of its script.
 
 use std::collections::BTreeMap;
 
@@ -11,17 +11,19 @@ pub struct PageData {
     pub t: Vec<f64>,
     /// Columns and rows of the image in which all boxes are given, pixels.
     pub image_px: [usize; 2],
-    /// Images as JPEG in base64, one for each frame; empty where there is none. None without any.
+    /// Images as JPEG in base64, one for each frame; empty for a frame without an image. `None`
+    /// without any.
     pub images: Option<Vec<String>>,
-    /// Points of laser scans in the odometry frame, cm, x and y in turn. None without any.
+    /// Points of laser scans in the odometry frame, cm, x and y in turn. `None` without any.
     pub scans: Option<Vec<Vec<i32>>>,
-    /// Directions of the left and the right edge of the view, rad from the heading of the robot.
+    /// Directions of the left and the right edge of the field of view, rad from the heading of the
+    /// robot.
     pub view_rad: Option<[f64; 2]>,
-    /// Annotated people by frame. None without truth.
+    /// Annotated people by frame. `None` without truth.
     pub truth: Option<Vec<Vec<TruthBox>>>,
     /// The runs, one or two.
     pub runs: Vec<RunData>,
-    /// True for a run that happens now: the page asks for its frames.
+    /// True for a live run, whose frames the page requests.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub live: bool,
 }
@@ -29,14 +31,14 @@ pub struct PageData {
 /// Annotated person in one frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct TruthBox {
-    /// Identity.
+    /// ID of the person.
     pub id: i64,
     /// Box in the image, pixels.
     #[serde(rename = "box")]
     pub box_px: Option<[f64; 4]>,
-    /// Place on the floor in the odometry frame, m.
+    /// Position on the floor in the odometry frame, m.
     pub at: Option<[f64; 2]>,
-    /// False for people that count neither as missed nor as found.
+    /// False for people that count neither as misses nor as hits.
     pub counts: bool,
 }
 
@@ -45,26 +47,27 @@ pub struct TruthBox {
 pub struct RunData {
     /// Name of the run.
     pub name: String,
-    /// Frames; none where the run has no frame at that time.
+    /// Frames; `None` if the run has no frame at that time.
     pub frames: Vec<Option<FrameData>>,
     /// Events in the order of time.
     pub events: Vec<EventData>,
     /// Tests of the funnel, by name, with their settings.
     pub tests: BTreeMap<String, TestData>,
-    /// Number of the track on each counted person of the truth, frame by frame; none for a miss.
+    /// ID of the track that matches each counted person of the truth, frame by frame; `None` for a
+    /// miss.
     pub hits: Option<Vec<BTreeMap<i64, Option<i64>>>>,
     /// Sentences that say why a person was missed.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub causes: Vec<String>,
-    /// Position of the sentence in `causes`, by the position of the frame and the person.
+    /// Index of the sentence in `causes`, by the index of the frame and the ID of the person.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub missed: BTreeMap<usize, BTreeMap<i64, usize>>,
-    /// The robot and the zones around it, where the run has a controller.
+    /// The robot and the zones around it, if the run has a controller.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub robot: Option<RobotData>,
 }
 
-/// Robot with the zones in which it drives slower or stands.
+/// Robot with the zones in which it slows down or stops.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct RobotData {
     /// Corners of its outline, robot frame, m.
@@ -73,12 +76,12 @@ pub struct RobotData {
     pub stop: Vec<[f64; 2]>,
     /// Corners of the slowdown polygon, robot frame, m; empty without one.
     pub slowdown: Vec<[f64; 2]>,
-    /// Distances from the outline at which an approaching person makes the robot stand, and at full
-    /// speed drive slower, m; none where people are judged like things.
+    /// Distances from the outline at which an approaching person makes the robot stop, and, at full
+    /// speed, slow down, m; `None` if people are treated like other obstacles.
     pub people: Option<[f64; 2]>,
-    /// Distance from the outline at which a thing ahead makes it stand, m.
+    /// Distance from the outline at which an obstacle ahead makes the robot stop, m.
     pub things: f64,
-    /// Time from an image to wheels that move accordingly, s.
+    /// Latency from an image to the response of the wheels, s.
     pub reaction: f64,
     /// Deceleration, m/s².
     pub decel: f64,
@@ -91,16 +94,19 @@ pub struct FrameData {
     pub n: u64,
     /// Pose of the robot in the odometry frame: x, y, heading.
     pub robot: [f64; 3],
-    /// Tracks, near to far.
+    /// True if the image is frozen: boxes and positions are those of an earlier time.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub stale: bool,
+    /// Tracks, nearest first.
     pub tracks: Vec<TrackData>,
     /// Candidates.
     pub found: Vec<CandidateData>,
-    /// Tests that dropped anything.
+    /// Tests that dropped candidates.
     pub dropped: Vec<DroppedData>,
     /// Track of the person to follow.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target: Option<u32>,
-    /// Target lock and command, where there is a controller.
+    /// Target lock and command, if there is a controller.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drive: Option<DriveData>,
 }
@@ -118,19 +124,19 @@ pub struct DriveData {
     pub belief: Option<f64>,
     /// Reason of the command, and its meaning.
     pub reason: [String; 2],
-    /// The person, the place or the sensor that is the cause; empty where there is none.
+    /// The person, the position or the sensor that is the cause; empty if there is none.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub cause: String,
     /// Commanded speed, m/s.
     pub v: f64,
-    /// Commanded rate of turn, to the left, rad/s.
+    /// Commanded turn rate, positive to the left, rad/s.
     pub w: f64,
-    /// Effect of the reason: `drives`, `slower`, `stands`, or empty where it is not known.
+    /// Effect of the reason: `drives`, `slower`, `stands`, or empty if it is unknown.
     pub motion: String,
-    /// Places of things in the odometry frame, cm, x and y in turn.
+    /// Positions of obstacles in the odometry frame, cm, x and y in turn.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub things: Vec<i32>,
-    /// Places of people and of things that move, cm, x and y in turn.
+    /// Positions of people and of moving obstacles, cm, x and y in turn.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub movers: Vec<i32>,
 }
@@ -145,10 +151,10 @@ pub struct TrackData {
     /// Upper-body square, pixels.
     #[serde(rename = "box")]
     pub box_px: [f64; 4],
-    /// Box of the whole person, pixels, where the run reports such boxes.
+    /// Box of the whole person, pixels, if the run reports such boxes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub whole: Option<[f64; 4]>,
-    /// Place in the odometry frame, m.
+    /// Position in the odometry frame, m.
     pub at: [f64; 2],
     /// Velocity in the odometry frame, m/s.
     pub v: [f64; 2],
@@ -161,7 +167,7 @@ pub struct TrackData {
     pub guess: bool,
     /// Probability that it is a person.
     pub p: f64,
-    /// Past places of the head in this image, pixels, x and y in turn.
+    /// Past positions of the head in this image, pixels, x and y in turn.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub trail: Vec<i32>,
 }
@@ -172,16 +178,16 @@ pub struct CandidateData {
     /// Upper-body square, pixels.
     #[serde(rename = "box")]
     pub box_px: [f64; 4],
-    /// Place in the odometry frame, m.
+    /// Position in the odometry frame, m.
     pub at: [f64; 2],
     /// Log-odds.
     pub score: f64,
     /// Detector.
     pub by: String,
-    /// Test that dropped it; none for one that was used.
+    /// Test that dropped it; `None` for a candidate that was used.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub test: Option<String>,
-    /// Track that it was given to, or that it started.
+    /// Track to which it was assigned, or that it started.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub track: Option<u32>,
     /// True if it started the track.
@@ -194,38 +200,38 @@ pub struct CandidateData {
 pub struct DroppedData {
     /// Name of the test.
     pub test: String,
-    /// Number of things that it dropped.
+    /// Number of candidates that it dropped.
     pub n: u64,
-    /// Their regions, as far as they are known and no candidate has them, pixels.
+    /// Regions of these, as far as they are known and not those of a candidate, pixels.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub boxes: Vec<[f64; 4]>,
-    /// Values that some of these were dropped for, in words, by the position of the box.
+    /// Values because of which some of these were dropped, in words, by the index of the region.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub values: BTreeMap<usize, String>,
 }
 
-/// Test of the funnel with what decides it.
+/// Test of the funnel with the settings that decide it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct TestData {
-    /// Lines of the config that decide it, with their values in this run.
+    /// Lines of the config that set it, with their values in this run.
     pub settings: Vec<String>,
-    /// Sentence that says why it drops people, with two settings at most.
+    /// Sentence on why it drops people, with at most two settings.
     pub why: String,
-    /// Stage of the test: of several at one place the last one decided.
+    /// Stage of the test; of several tests at one position, the last one decided.
     pub stage: usize,
 }
 
 /// Event to jump to.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct EventData {
-    /// Position in the times of the page.
+    /// Index in the times of the page.
     pub i: usize,
     /// Kind, for example `started`.
     pub kind: &'static str,
-    /// Track that it is about.
+    /// Track of the event.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub track: Option<u32>,
-    /// Person of the truth that it is about.
+    /// Person of the truth of the event.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub person: Option<i64>,
     /// One sentence.

@@ -1,31 +1,31 @@
-//! Events of a run: people that appear, are lost, and come back.
+//! Events of a run: people appear, are lost, and come back.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::page::data::EventData;
 use crate::page::moment::Moment;
 
-/// Time without evidence from which on a person counts as lost, s.
+/// Time without evidence after which a person counts as lost, s.
 const LOST_AFTER_S: f64 = 0.5;
 
-/// Time after which a cause of a stop or of a lower speed that returns is another event, s.
+/// Time after which the same cause of a stop or of a lower speed is a new event, s.
 const SAME_CAUSE_S: f64 = 2.0;
 
-/// Course of one person so far.
+/// History of one person so far.
 #[derive(Clone, Copy, Debug)]
 struct Course {
-    /// Position and time of the last frame with evidence.
+    /// Index and time of the last frame with evidence.
     seen: (usize, f64),
-    /// Position of the first frame without evidence since then.
+    /// Index of the first frame without evidence since then.
     unseen_since: Option<usize>,
-    /// Position of the last frame with the track.
+    /// Index of the last frame with the track.
     present: usize,
     is_lost: bool,
     has_ended: bool,
 }
 
 impl Course {
-    /// Begins the course of a track at a position and time of the page.
+    /// Starts the history of a track at an index and time of the page.
     fn begun(at: usize, t_s: f64) -> Self {
         Self { seen: (at, t_s), unseen_since: None, present: at, is_lost: false, has_ended: false }
     }
@@ -44,29 +44,29 @@ pub fn of_run(times: &[f64], moments: &[Option<&Moment>]) -> Vec<EventData> {
     watch.events
 }
 
-/// Watch over a run, frame by frame.
+/// Detection of events in a run, frame by frame.
 #[derive(Default)]
 pub struct Watch {
     events: Vec<EventData>,
     courses: BTreeMap<u32, Course>,
     target: Option<u32>,
     lock: Option<String>,
-    /// Tracks that may have changed over with others.
+    /// Tracks that may have been swapped with others.
     doubtful: BTreeSet<u32>,
-    /// Times at which each cause of a stop or of a lower speed held last, s.
+    /// Last time at which each cause of a stop or of a lower speed held, s.
     causes: BTreeMap<String, f64>,
-    /// True if the robot stood and did not drive since then.
+    /// True if the robot has stopped and not driven since then.
     stood: bool,
 }
 
 impl Watch {
-    /// Takes the events since the last call. One that is noticed late has the position of the frame
-    /// in which it began.
+    /// Returns the events since the last call. An event that is detected late has the index of the
+    /// frame in which it began.
     pub fn drain(&mut self) -> Vec<EventData> {
         std::mem::take(&mut self.events)
     }
 
-    /// Takes a frame at a position and time of the page.
+    /// Adds a frame at an index and time of the page.
     pub fn take(&mut self, at: usize, t_s: f64, moment: &Moment) {
         for track in moment.tracks.iter().filter(|track| track.confirmed) {
             if track.seen { self.see(at, t_s, track.id) } else { self.miss(at, t_s, track.id) }
@@ -85,7 +85,7 @@ impl Watch {
         self.compare_motion(at, t_s, moment);
     }
 
-    /// Tells which tracks may have changed over, once while that lasts, and which of them did.
+    /// Reports which tracks may have been swapped, once while that lasts, and which of them were.
     fn compare_doubts(&mut self, at: usize, moment: &Moment) {
         let doubts = &moment.notes.doubts;
         let before = std::mem::take(&mut self.doubtful);
@@ -103,7 +103,7 @@ impl Watch {
         }
     }
 
-    /// Tells a change of the target lock's state with its cause.
+    /// Reports a change of the state of the target lock, with its cause.
     fn compare_lock(&mut self, at: usize, moment: &Moment) {
         let Some(drive) = &moment.notes.drive else { return };
         let before = self.lock.replace(drive.lock.clone());
@@ -113,11 +113,11 @@ impl Watch {
         }
     }
 
-    /// Tells why the robot stands or drives slower, and that it drives again after a stop. A cause that
-    /// comes and goes from frame to frame is told once.
+    /// Reports why the robot stops or slows down, and that it drives again after a stop. A cause
+    /// that comes and goes from frame to frame is reported once.
     fn compare_motion(&mut self, at: usize, t_s: f64, moment: &Moment) {
         let Some(drive) = &moment.notes.drive else { return };
-        // To stand at the distance to keep, or to begin, is no event.
+        // To stop at the distance to keep, or at the start, is not an event.
         let is_as_asked = matches!(drive.reason.as_str(), "follow" | "limited");
         let kind = match drive.motion.as_str() {
             "stands" if is_as_asked => return,
@@ -156,7 +156,7 @@ impl Watch {
         let course = self.courses.entry(id).or_insert_with(|| Course::begun(at, t_s));
         course.present = at;
         let since = *course.unseen_since.get_or_insert(at);
-        // A single frame without evidence is no event.
+        // A single frame without evidence is not an event.
         let is_lost = t_s - course.seen.1 >= LOST_AFTER_S;
         let newly_lost = is_lost && !std::mem::replace(&mut course.is_lost, is_lost);
         if is_new {
@@ -167,7 +167,7 @@ impl Watch {
         }
     }
 
-    /// Ends the courses of tracks that are gone.
+    /// Ends the histories of tracks that have ended.
     fn end_absent(&mut self, at: usize, moment: &Moment) {
         let mut gone = Vec::new();
         for (id, course) in &mut self.courses {

@@ -12,10 +12,10 @@ use toml::Table;
 use crate::page::data::{CandidateData, DriveData, DroppedData, FrameData, TestData, TrackData};
 use crate::page::moment::{Moment, TrackState};
 
-/// Points kept of a laser scan.
+/// Largest number of points of a laser scan.
 const SCAN_POINTS: usize = 240;
 
-/// Returns all tests that dropped anything, with the settings that decide them.
+/// Returns all tests that dropped candidates, with the settings that decide them.
 pub fn tests<'a>(
     notes: impl Iterator<Item = &'a FrameNotes>,
     config: &Table,
@@ -27,7 +27,7 @@ pub fn tests<'a>(
         let remedy = remedies.of_config(name, config);
         let settings = remedy.map_or_else(Vec::new, |remedy| remedy.lines(config));
         let why = remedies.sentence(name, config);
-        // The page compares stages alone.
+        // The page only compares stages.
         let stage = if is_telling(name) { 1 + remedies.stage(name, config) } else { 0 };
         tests.insert(name.to_owned(), TestData { settings, why, stage });
     }
@@ -52,6 +52,7 @@ pub fn frame_data(moment: &Moment) -> FrameData {
     FrameData {
         n: notes.frame,
         robot: notes.robot_odom,
+        stale: notes.drive.as_ref().is_some_and(|drive| drive.shows_past),
         tracks: moment.tracks.iter().map(|track| track_data(track, notes.robot_odom[2])).collect(),
         found: notes.candidates.iter().map(candidate_data).collect(),
         dropped: dropped_data(notes),
@@ -102,7 +103,8 @@ fn candidate_data(note: &CandidateNote) -> CandidateData {
     }
 }
 
-/// Returns the funnel; the places of candidates are left to the candidates, which say more.
+/// Returns the funnel without the regions of candidates, because the data of the candidates have
+/// more detail.
 fn dropped_data(notes: &FrameNotes) -> Vec<DroppedData> {
     let of_candidates: BTreeSet<&str> = notes.candidates.iter().filter_map(dropping_test).collect();
     notes
@@ -181,7 +183,7 @@ pub fn add_trails(
 ) {
     for track in frame.tracks.iter_mut().filter(|track| track.state == "seen") {
         let heads = past.iter().filter_map(|frame| frame.tracks.iter().find(|t| t.id == track.id));
-        // A predicted position is no place at which the person was.
+        // A trail has no predicted positions, where the person may never have been.
         let heads = heads.filter(|t| t.state == "seen");
         let heads = heads.map(|t| {
             let floor = odom_from_robot.inverse_transform_point(&Point2::from(t.at));
@@ -243,6 +245,16 @@ mod tests_of_data {
         let data = track_data(&track, std::f64::consts::FRAC_PI_2);
         assert_eq!((data.v, data.d, data.state), ([0.0, 1.0], 5.0, "predicted"));
         assert!(data.guess);
+    }
+
+    #[test]
+    fn a_frame_of_a_frozen_camera_is_stale() {
+        let mut moment = Moment::default();
+        for (shows_past, text) in [(true, Some(true)), (false, None)] {
+            moment.notes.drive = Some(DriveNote { shows_past, ..DriveNote::default() });
+            let data = serde_json::to_value(frame_data(&moment)).unwrap();
+            assert_eq!(data.get("stale").map(|stale| stale == true), text);
+        }
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! HTML of the page: its frame, with data, and with style and script inlined or beside it.
+//! HTML of the page, with its data, and with style and script inlined or in separate files.
 
 use maud::{Markup, PreEscaped, html};
 use tagalong_core::TrackId;
@@ -12,7 +12,7 @@ const STYLE: &str = concat!(include_str!("page.css"), "\n");
 const SCRIPT: &str = include_str!("page.js");
 const LIVE_SCRIPT: &str = include_str!("live.js");
 
-/// Keys of the page, and what they do.
+/// Keyboard shortcuts of the page, with their effects.
 const KEYS: [(&str, &str); 8] = [
     ("Space", "play, pause"),
     ("← →", "one frame back, ahead; with Shift ten"),
@@ -34,7 +34,7 @@ pub struct Heading {
     pub notes: Vec<String>,
 }
 
-/// Returns the page of recorded runs as one text without any reference to another file.
+/// Returns the page of recorded runs as one self-contained text.
 ///
 /// # Errors
 /// Data that JSON cannot express.
@@ -43,13 +43,13 @@ pub fn html(heading: &Heading, data: &PageData) -> serde_json::Result<String> {
     whole(heading, data, &style, &html! { script { (PreEscaped(SCRIPT)) } })
 }
 
-/// Returns the page of a run that happens now; a server has [`style`] as `page.css`, [`scripts`],
-/// and answers to what they ask.
+/// Returns the page of a live run; its server has to serve [`style`] as `page.css`, the
+/// [`scripts`], and the answers to their requests.
 ///
 /// # Errors
 /// Data that JSON cannot express.
 pub fn live_html(heading: &Heading, data: &PageData) -> serde_json::Result<String> {
-    // Without an icon of its own a browser would ask for one outside of the key.
+    // Without an icon in the page, a browser would request one outside of the key.
     let style = html! { link rel="icon" href="data:,"; link rel="stylesheet" href="page.css"; };
     let names = scripts().map(|(name, _)| name);
     let scripts = html! { @for name in names { script src=(name) {} } };
@@ -69,7 +69,7 @@ fn hex([r, g, b]: [u8; 3]) -> String {
     format!("#{r:02x}{g:02x}{b:02x}")
 }
 
-/// Returns names and texts of the scripts of [`live_html`], in their order.
+/// Returns the names and texts of the scripts of [`live_html`], in order.
 pub fn scripts() -> [(&'static str, &'static str); 2] {
     [("page.js", SCRIPT), ("live.js", LIVE_SCRIPT)]
 }
@@ -100,12 +100,12 @@ fn whole(
     Ok(page.into_string())
 }
 
-/// Escapes JSON so that no text in it can end the script that holds it.
+/// Escapes JSON so that no text in it can end the script element around it.
 fn script_safe(json: &str) -> String {
     let mut out = String::with_capacity(json.len());
     for letter in json.chars() {
         match letter {
-            // The two separators are line ends in older scripts.
+            // Older versions of JavaScript treat the two separators as line ends.
             '<' | '>' | '&' | '\u{2028}' | '\u{2029}' => {
                 out += &format!("\\u{:04x}", u32::from(letter));
             }
@@ -126,7 +126,7 @@ fn top(heading: &Heading) -> Markup {
     }
 }
 
-/// Renders a place for the image and the plan of each run.
+/// Renders the elements for the image and the plan of each run.
 fn stage(names: &[&str]) -> Markup {
     let class = if names.len() > 1 { "runs two" } else { "runs" };
     html! {
@@ -158,13 +158,13 @@ fn mark(class: &str, text: &str) -> Markup {
     html! { span { span class=(format!("mark {class}")) {} (text) } }
 }
 
-/// Renders the meaning of the boxes in the image; those of a layer are shown with it.
+/// Renders the legend of the boxes in the image; entries of a layer are shown with the layer.
 fn image_marks() -> Markup {
     html! {
         (mark("box-seen", "seen"))
         (mark("box-guess", "predicted"))
         (mark("box-tentative", "not confirmed yet"))
-        span { "~ guessed distance" }
+        span { "distance from the robot's middle, ~ guessed" }
         span data-layer="target" { (mark("sign", "target")) }
         span data-layer="truth" { (mark("box-truth", "annotated")) }
         span data-layer="truth" { (mark("box-miss", "missed")) }
@@ -172,7 +172,7 @@ fn image_marks() -> Markup {
     }
 }
 
-/// Renders the meaning of the marks in the plan.
+/// Renders the legend of the marks in the plan.
 fn plan_marks() -> Markup {
     html! {
         (mark("dot", "seen"))
@@ -187,7 +187,7 @@ fn plan_marks() -> Markup {
     }
 }
 
-/// Renders the meaning of the marks around a robot that is driven.
+/// Renders the legend of the marks around a robot with a controller.
 fn zones() -> Markup {
     html! {
         (mark("way", "path until it stops"))
@@ -199,7 +199,7 @@ fn zones() -> Markup {
     }
 }
 
-/// Renders the meaning of the lines above the slider.
+/// Renders the legend of the lines above the slider.
 fn strip_legend() -> Markup {
     html! {
         p class="legend" {
@@ -213,7 +213,7 @@ fn strip_legend() -> Markup {
     }
 }
 
-/// Buttons of the time line: their ids, signs and names.
+/// Buttons of the time line: their IDs, symbols and names.
 const BUTTONS: [[&str; 3]; 5] = [
     ["before", "|◂", "Previous event"],
     ["back", "◂", "One frame back"],
@@ -222,7 +222,7 @@ const BUTTONS: [[&str; 3]; 5] = [
     ["next", "▸|", "Next event"],
 ];
 
-/// Renders the controls, which stay in view.
+/// Renders the controls, which always stay visible.
 fn time_line(names: &[&str]) -> Markup {
     html! {
         section class="time" aria-label="Time line" {
@@ -289,7 +289,7 @@ fn answers(names: &[&str]) -> Markup {
     }
 }
 
-/// Renders a place for each run, with its name where there are two.
+/// Renders an element for each run, with its name if there are two.
 fn columns(id: &str, names: &[&str]) -> Markup {
     html! {
         div class=(if names.len() > 1 { "columns two" } else { "columns" }) {
@@ -361,6 +361,15 @@ mod tests {
             assert!(page.contains(&format!(".c{id} {{ --c: {colour}; }}")), "{id}");
             // Plans of a report have the same.
             assert!(BASE_STYLE.contains(&format!("--t{id}: {colour};")), "{id}");
+        }
+    }
+
+    /// Causes of stops have the distance from the edge of the robot.
+    #[test]
+    fn distances_of_people_name_the_middle_of_the_robot() {
+        assert!(hostile_page().contains("distance from the robot's middle, ~ guessed"));
+        for words in ["from the middle of the robot", "\"From the robot's middle\", \"Speed\""] {
+            assert!(SCRIPT.contains(words), "{words}");
         }
     }
 

@@ -1,9 +1,9 @@
-//! The page on which runs are seen: time line, images with boxes and trails, plan from above, target
-//! and command, the funnel of each frame, events, and the answer to why a person was missed.
+//! The page that shows runs: time line, images with boxes and trails, a plan view, target and
+//! command, the funnel of each frame, events, and why a person was missed.
 //!
-//! [`html`] makes it as one file of recorded runs, or as the frame of a page that asks for what
-//! happens now. The script shows the data as it is: nothing is computed a second time in the browser
-//! but the answer to a click.
+//! [`html`] creates it as one file of recorded runs, or as the skeleton of a live page that
+//! requests its frames. The script shows the data unchanged: apart from the answers to clicks,
+//! nothing is computed in the browser.
 
 pub mod data;
 pub mod events;

@@ -1,4 +1,5 @@
-//! Frame of a run as the page needs it, read from a file or taken from a pipeline.
+//! Frame of a run as the page needs it, read from a file or converted from the report of a
+//! pipeline.
 
 use nalgebra::Isometry2;
 use serde::Deserialize;
@@ -24,13 +25,13 @@ pub struct Moment {
 pub struct TrackState {
     /// Number of the track.
     pub id: u32,
-    /// True once the track is reported.
+    /// True once the track is confirmed.
     pub confirmed: bool,
-    /// True if evidence of this frame supports it.
+    /// True if there is evidence for it in this frame.
     pub seen: bool,
     /// True if a nearer tracked person hides it.
     pub occluded: bool,
-    /// Time since evidence supported it, s.
+    /// Time since the last evidence for it, s.
     pub unseen_s: f64,
     /// Probability that it is a person.
     pub probability: f64,
@@ -48,7 +49,7 @@ pub struct TrackState {
 }
 
 impl Moment {
-    /// Takes a frame from the report of a pipeline.
+    /// Converts the report of a pipeline.
     pub fn of(report: &FrameReport, camera: &Camera, odom_from_robot: &Isometry2<f64>) -> Self {
         Self {
             notes: FrameNotes::of(report, camera, odom_from_robot),
@@ -59,7 +60,7 @@ impl Moment {
 }
 
 impl TrackState {
-    /// Returns the track as the search for a cause of a miss needs it.
+    /// Returns the track in the form for the search for the cause of a miss.
     pub fn sighted(&self) -> SightedTrack {
         SightedTrack {
             id: self.id,

@@ -34,6 +34,8 @@
     frame.robot = [...turned(frame.robot), frame.robot[2] + turn.angle];
     for (const thing of [...frame.tracks, ...frame.found]) thing.at = turned(thing.at);
     for (const track of frame.tracks) track.v = turned(track.v);
+    // In a frozen image people are where they were, and none of them is seen.
+    for (const track of frame.tracks) if (frame.stale && track.state !== "tentative") track.state = "stale";
     if (frame.drive) [frame.drive.things, frame.drive.movers].forEach(turnScan);
   };
   const turnScan = (scan) => {
@@ -111,18 +113,21 @@
   };
 
   const shownBox = (track) => track.whole || track.box;
-  const STATES = { seen: "", hidden: " predicted", predicted: " predicted", tentative: " ?" };
+  const STATES = { seen: "", hidden: " predicted", predicted: " predicted", tentative: " ?", stale: " stale" };
   // The same in full.
   const stateOf = (track) => (track.state === "hidden" ? "predicted, hidden by another person"
-    : track.state === "tentative" ? "not confirmed yet" : track.state);
-  // The distance, with `~` before one that is a guess.
+    : track.state === "tentative" ? "not confirmed yet"
+      : track.state === "stale" ? "stale, of a frozen image" : track.state);
+  // Neither has the colour of a person in sight.
+  const isGrey = (track) => track.state === "tentative" || track.state === "stale";
+  // The distance from the middle of the robot, with `~` before one that is a guess.
   const away = (track, digits) => `${track.guess ? "~" : ""}${fixed(track.d, digits)} m`;
   const trackKind = (track) =>
     track.state === "seen" ? colour(track.id)
-      : track.state === "tentative" ? "tentative" : `${colour(track.id)} guess`;
+      : isGrey(track) ? track.state : `${colour(track.id)} guess`;
 
   const trailLine = (track, k) => {
-    if (!track.trail || track.trail.length < 4) return null;
+    if (track.state !== "seen" || !track.trail || track.trail.length < 4) return null;
     const points = [];
     for (let i = 0; i < track.trail.length; i += 2) points.push(`${track.trail[i]},${track.trail[i + 1]}`);
     return svg("polyline", { class: `trail ${colour(track.id)}`, points: points.join(" "), "stroke-width": 2 * k });
@@ -180,7 +185,7 @@
   };
 
   const describe = (track) =>
-    `track ${track.id}, ${stateOf(track)}, ${away(track, 1)} away, ${fixed(Math.hypot(...track.v), 1)} m/s`;
+    `track ${track.id}, ${stateOf(track)}, ${away(track, 1)} from the middle of the robot, ${fixed(Math.hypot(...track.v), 1)} m/s`;
 
   // ---- plan ------------------------------------------------------------------------------------
 
@@ -303,7 +308,7 @@
 
   const targetLine = (frame, k) => {
     const track = frame.tracks.find((other) => other.id === frame.target);
-    if (!track) return null;
+    if (!track || track.state === "stale") return null;
     return svg("line", { class: `target ${colour(track.id)}`, x1: frame.robot[0], y1: -frame.robot[1], x2: track.at[0], y2: -track.at[1], "stroke-width": 1.5 * k, "stroke-dasharray": `${4 * k} ${4 * k}` });
   };
 
@@ -332,13 +337,13 @@
   const personMark = (run, track, k) => {
     const [x, y] = [track.at[0], -track.at[1]];
     const r = Math.min(Math.max(0.2, 5 * k), 9 * k);
-    const kind = track.state === "tentative" ? "tentative"
+    const kind = isGrey(track) ? track.state
       : `${colour(track.id)}${track.state === "seen" ? "" : " guess"}`;
     const ahead = { x1: x, y1: y, x2: x + track.v[0], y2: y - track.v[1] };
     return svg("g", { "data-track": track.id },
       svg("title", {}, describe(track)),
-      id("show-trails").checked && track.state !== "tentative" ? planTrail(run, track, k) : null,
-      track.state === "tentative" ? null : svg("line", { class: `speed ${colour(track.id)}`, ...ahead, "stroke-width": 2.5 * k }),
+      id("show-trails").checked && !isGrey(track) ? planTrail(run, track, k) : null,
+      isGrey(track) ? null : svg("line", { class: `speed ${colour(track.id)}`, ...ahead, "stroke-width": 2.5 * k }),
       svg("circle", { class: `person ${kind}`, cx: x, cy: y, r, "stroke-width": 2 * k }));
   };
 
@@ -523,7 +528,7 @@
 
   // ---- tables ----------------------------------------------------------------------------------
 
-  const NUMBERS = ["Distance", "Speed", "Probability", "Number"];
+  const NUMBERS = ["From the robot's middle", "Speed", "Probability", "Number"];
   const table = (caption, heads, rows) =>
     el("div", { class: "scroll", role: "region", "aria-label": caption, tabindex: "0" }, el("table", {},
       el("thead", {}, el("tr", {}, ...heads.map((head) => el("th", { scope: "col", class: NUMBERS.includes(head) ? "number" : "" }, head)))),
@@ -538,7 +543,7 @@
     const row = (track) => el("tr", {},
       el("th", { scope: "row" }, el("span", { class: `swatch ${colour(track.id)}` }), String(track.id)),
       el("td", {}, stateOf(track)), number(away(track, 2)), number(`${fixed(Math.hypot(...track.v), 2)} m/s`), number(fixed(track.p, 2)));
-    return place.replaceChildren(table(`People of ${run.name}`, ["Track", "State", "Distance", "Speed", "Probability"], tracks.map(row)));
+    return place.replaceChildren(table(`People of ${run.name}`, ["Track", "State", "From the robot's middle", "Speed", "Probability"], tracks.map(row)));
   };
 
   const settings = (run, test) => {
@@ -843,7 +848,8 @@
       drawPlan(run, number);
       const frame = frameOf(run, state.at);
       const seen = frame ? frame.tracks.filter((track) => track.state === "seen").length : 0;
-      id(`now-${number}`).textContent = frame ? `${seen} seen` : "no frame";
+      id(`now-${number}`).textContent = !frame ? "no frame"
+        : frame.stale ? "frozen image: the places of people are old" : `${seen} seen`;
       people(run, id(`people-${number}`));
       drive(run, id(`drive-${number}`));
       funnel(run, id(`funnel-${number}`));

@@ -1,4 +1,4 @@
-//! Robot of a run, and the zones around it, from the resolved config.
+//! Robot of a run and the zones around it, from the resolved config.
 
 use serde::Deserialize;
 use tagalong_pipeline::{
@@ -9,7 +9,7 @@ use toml::{Table, Value};
 
 use crate::page::data::RobotData;
 
-/// Tables of the config that the zones follow from.
+/// Tables of the config that determine the zones.
 #[derive(Default, Deserialize)]
 #[serde(default)]
 struct Tables {
@@ -18,8 +18,8 @@ struct Tables {
     collision_monitor: CollisionMonitorSettings,
 }
 
-/// Returns the robot of a resolved config; none without a controller, or where an earlier version
-/// wrote tables that cannot be read any more.
+/// Returns the robot of a resolved config; `None` without a controller, or if the tables were
+/// written by an earlier version and cannot be read any more.
 pub fn robot_data(config: &Table) -> Option<RobotData> {
     config.get("controller")?;
     let own = ["robot", "command_limiter", "collision_monitor"];
