@@ -1,12 +1,14 @@
 //! Input of the checks, collected in one pass over the frames.
 
 use std::cell::OnceCell;
+use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use serde::Serialize;
 use tagalong_app::missed::Cause;
-use tagalong_core::{DepthImage, Frame, LaserScan};
-use tagalong_geometry::Camera;
+use tagalong_core::{DepthImage, Frame, LaserScan, Stamp};
+use tagalong_geometry::{Camera, Lens};
 use tagalong_log::{InputSettings, Inputs, Inspection, LogError, LogFrame};
 use tagalong_pipeline::{MissingSource, Suits};
 use tagalong_vision::ground::{Ground, GroundSettings, ground_of_depth};
@@ -66,7 +68,7 @@ pub struct Evidence {
     pub coverage: Coverage,
     /// Reasons why shapes that come and go have no track, with their numbers, most frequent first.
     pub causes: Vec<(Cause, usize)>,
-    /// Share of the points in depth that come and go; `None` without depth.
+    /// Share of the points in depth that come and go; `None` where none can be compared.
     pub changed: Option<f64>,
     /// Built-in configs that fit the log, the best first; only searched when they are needed.
     pub fitting: Vec<&'static str>,
@@ -80,6 +82,13 @@ impl Evidence {
     /// Returns true if the height and tilt of the camera are only assumed.
     pub fn is_pose_assumed(&self) -> bool {
         self.inspection.facts.camera_source.starts_with("an assumption")
+    }
+
+    /// Returns true if the lens of the camera is a mere assumption.
+    pub fn is_lens_assumed(&self) -> bool {
+        let camera = self.samples.camera.as_ref();
+        let is_pinhole = camera.is_some_and(|camera| matches!(camera.lens, Lens::Pinhole(_)));
+        is_pinhole && self.inspection.facts.calibration_topic.is_none()
     }
 }
 
@@ -150,7 +159,7 @@ impl Driven {
 }
 
 /// Measurements of laser scans.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Scans {
     /// Number of scans.
     pub count: usize,
@@ -164,12 +173,35 @@ pub struct Scans {
     pub farthest_m: f64,
     /// Height of the scanner above the floor, m.
     pub height_m: f64,
+    /// Scan of about a second before.
+    pub(super) earlier: Option<TimedRanges>,
+    /// Rays with a reflection in two scans a second apart, and those of them that changed.
+    pub(super) compared: u64,
+    pub(super) changed: u64,
 }
 
+/// Ranges of a scan by their rays, m, with its time.
+#[derive(Clone, Debug)]
+pub(super) struct TimedRanges {
+    stamp: Stamp,
+    increment_rad: f64,
+    ranges: BTreeMap<u32, f64>,
+}
+
+/// Time between two scans that are compared, s.
+const SCANS_APART_S: RangeInclusive<f64> = 1.0..=1.5;
+/// Difference of two ranges of a ray that counts as a change, m.
+const RAY_CHANGED_M: f64 = 0.2;
+
 impl Scans {
-    fn take(&mut self, scan: &LaserScan) {
+    fn take(&mut self, scan: &LaserScan, at: Stamp) {
         let eye = scan.robot_from_scanner.translation.vector;
         let ranges = scan.points.iter().map(|point| (point.coords - eye).norm());
+        self.compare(TimedRanges {
+            stamp: scan.stamp.unwrap_or(at),
+            increment_rad: scan.increment_rad,
+            ranges: scan.rays.iter().copied().zip(ranges.clone()).collect(),
+        });
         self.count += 1;
         self.readings += scan.points.len();
         let reflected = scan.rays.last().copied();
@@ -178,6 +210,34 @@ impl Scans {
         self.increment_rad = scan.increment_rad.abs();
         self.farthest_m = ranges.fold(self.farthest_m, f64::max);
         self.height_m = eye.z;
+    }
+
+    /// Compares a scan with the one of a second before.
+    fn compare(&mut self, now: TimedRanges) {
+        let Some(earlier) = &self.earlier else {
+            self.earlier = Some(now);
+            return;
+        };
+        let apart_s = now.stamp.seconds_since(earlier.stamp);
+        if (0.0..*SCANS_APART_S.start()).contains(&apart_s) {
+            return;
+        }
+        // After a pause or a jump of the clock, or with other rays, two scans cannot be compared.
+        if SCANS_APART_S.contains(&apart_s) && now.increment_rad == earlier.increment_rad {
+            for (ray, range_m) in &now.ranges {
+                if let Some(earlier_m) = earlier.ranges.get(ray) {
+                    self.compared += 1;
+                    self.changed += u64::from((range_m - earlier_m).abs() > RAY_CHANGED_M);
+                }
+            }
+        }
+        self.earlier = Some(now);
+    }
+
+    /// Returns the share of rays whose range changes by more than 0.2 m in a second; `None` if no two
+    /// scans could be compared.
+    pub fn changed(&self) -> Option<f64> {
+        (self.compared > 0).then(|| self.changed as f64 / self.compared as f64)
     }
 
     /// Returns the share of rays that were reflected.
@@ -223,9 +283,9 @@ impl Samples {
     /// Measures the frame if it is selected.
     pub fn take(&mut self, number: u64, item: &LogFrame) {
         // Scans are cheap, and the number of rays is that of the longest one.
-        self.take_scan(0, item.frame.laser());
+        self.take_scan(0, item.frame.laser(), item.frame.stamp);
         for (place, scan) in item.frame.further_scans().iter().enumerate() {
-            self.take_scan(place + 1, scan.as_ref());
+            self.take_scan(place + 1, scan.as_ref(), item.frame.stamp);
         }
         if !number.is_multiple_of(self.every) {
             return;
@@ -253,19 +313,19 @@ impl Samples {
 
 impl Samples {
     /// Measures the scan of a scanner, if it has one.
-    fn take_scan(&mut self, scanner: usize, scan: Option<&LaserScan>) {
+    fn take_scan(&mut self, scanner: usize, scan: Option<&LaserScan>, at: Stamp) {
         let Some(scan) = scan else { return };
         if self.scans.len() <= scanner {
             self.scans.resize(scanner + 1, Scans::default());
         }
-        self.scans[scanner].take(scan);
+        self.scans[scanner].take(scan, at);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use nalgebra::{Isometry3, Translation3, UnitQuaternion};
-    use tagalong_core::{EgoMotion, Images, Stamp};
+    use tagalong_core::{EgoMotion, Images};
     use tagalong_geometry::Pinhole;
 
     use super::*;
@@ -293,10 +353,10 @@ mod tests {
     fn scans_are_counted_for_each_scanner() {
         let mut samples = Samples::of(3);
         let met = LaserScan::of_points(vec![nalgebra::Point3::new(2.0, 0.0, 0.0)]);
-        samples.take_scan(2, Some(&met));
-        samples.take_scan(0, Some(&met));
-        samples.take_scan(0, None);
-        samples.take_scan(0, Some(&LaserScan::of_points(Vec::new())));
+        samples.take_scan(2, Some(&met), Stamp::default());
+        samples.take_scan(0, Some(&met), Stamp::default());
+        samples.take_scan(0, None, Stamp::default());
+        samples.take_scan(0, Some(&LaserScan::of_points(Vec::new())), Stamp::default());
         let counts: Vec<usize> = samples.scans.iter().map(|scans| scans.count).collect();
         let readings: Vec<usize> = samples.scans.iter().map(|scans| scans.readings).collect();
         assert_eq!((counts, readings), (vec![2, 0, 1], vec![1, 0, 1]));
@@ -308,5 +368,24 @@ mod tests {
         assert!(!moves(0.01, 0.01), "a loose joint");
         assert!(moves(0.3, 0.0));
         assert!(moves(0.0, 0.2));
+    }
+
+    /// Returns the share of changed rays of a scanner that approaches a wall at a speed.
+    fn changed_at(speed_mps: f64) -> Option<f64> {
+        let mut scans = Scans::default();
+        for index in 0..25 {
+            let seconds = 0.1 * f64::from(index);
+            let ranges = (0..90).map(|ray| (ray, 6.0 - speed_mps * seconds)).collect();
+            let stamp = Stamp::default().plus_seconds(seconds);
+            scans.compare(TimedRanges { stamp, increment_rad: 0.02, ranges });
+        }
+        scans.changed()
+    }
+
+    #[test]
+    fn the_rays_of_a_scanner_that_drives_change() {
+        assert_eq!(changed_at(0.0), Some(0.0));
+        assert_eq!(changed_at(0.5), Some(1.0));
+        assert_eq!(Scans::default().changed(), None);
     }
 }

@@ -199,9 +199,10 @@ fn drop(out: &mut String, drop: &Drop) {
 }
 
 fn summary(out: &mut String, findings: &[Finding]) {
-    let [bad, warn] = [Severity::Bad, Severity::Warn]
+    let [bad, warn, unknown] = [Severity::Bad, Severity::Warn, Severity::Unknown]
         .map(|severity| findings.iter().filter(|finding| finding.severity == severity).count());
     let _ = match (bad, warn) {
+        (0, 0) if unknown > 0 => writeln!(out, "\nno problem found; {unknown} not known"),
         (0, 0) => writeln!(out, "\nno problem found"),
         _ => writeln!(out, "\n{bad} bad, {warn} to look at; begin with the first one"),
     };
@@ -224,6 +225,17 @@ mod tests {
         let rows = [taken, other];
         better(&mut out, &rows[0], &rows);
         out
+    }
+
+    #[test]
+    fn a_finding_that_is_not_known_is_not_passed_over() {
+        let mut out = String::new();
+        let well = Finding::new("rate", Severity::Ok, "");
+        summary(&mut out, std::slice::from_ref(&well));
+        assert_eq!(out, "\nno problem found\n");
+        out.clear();
+        summary(&mut out, &[well, Finding::new("odometry", Severity::Unknown, "")]);
+        assert_eq!(out, "\nno problem found; 1 not known\n");
     }
 
     #[test]

@@ -106,7 +106,7 @@ impl Visit {
             look(frames, &mut pipeline, scope, &mut evidence, &mut views, &progress);
         }
         let scenery = views.judge();
-        evidence.changed = (!scenery.moments.is_empty()).then_some(scenery.changed);
+        evidence.changed = scenery.changed;
         evidence.coverage = Coverage::of(&evidence.trial.course, &scenery);
         let remedies = Remedies::new(registry);
         let rules = Rules { remedies: &remedies, config: pipeline.config().values() };

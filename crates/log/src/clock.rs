@@ -10,6 +10,12 @@ const COARSE_S: f64 = 0.3;
 const LEAST_MESSAGES: usize = 5;
 /// Maximum spread of a constant lag, s, between the tenth and the ninetieth percentile.
 const CONSTANT_S: f64 = 0.2;
+/// Time by which stamps are later than their recording beyond which their clock is not that of the
+/// recording, s.
+pub(crate) const FUTURE_S: f64 = 0.25;
+/// Delay of stamps behind those of other messages beyond which their clock is another one, s. Messages
+/// that are computed may come late by less, with right stamps.
+pub(crate) const DELAY_S: f64 = 1.0;
 /// Nanoseconds of a second.
 const SECOND_NS: u64 = 1_000_000_000;
 
@@ -117,6 +123,19 @@ pub(crate) fn constant_lag_s(stamps: &[Stamp], recorded: &[Stamp]) -> Option<f64
     median(lags_s).filter(|_| is_constant)
 }
 
+/// Returns the time by which the stamps of second messages are later than those of first ones, s, from
+/// the times by which each are later than their recording, if those show that the two have different
+/// clocks: second messages with stamps of the future have, because none is recorded before its capture.
+/// Where no stamps agree (`are_apart`), first ones of the future show it, too, and so does a delay that no
+/// camera has. Where they agree, the second ones may have been computed later.
+pub(crate) fn other_clock_s(of_first_s: f64, of_second_s: f64, are_apart: bool) -> Option<f64> {
+    let off_s = of_second_s - of_first_s;
+    let is_ahead = off_s > FUTURE_S && of_second_s > FUTURE_S && of_first_s < FUTURE_S;
+    let is_behind = off_s < -FUTURE_S && of_first_s > FUTURE_S && of_second_s < FUTURE_S;
+    let is_other = is_ahead || are_apart && (is_behind || off_s.abs() > DELAY_S);
+    is_other.then_some(off_s)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -140,6 +159,23 @@ mod tests {
         let twice = Times::of(&at(&[0.0, 0.0, 1.0, 1.0]), &at(&[0.01, 0.02, 1.01, 1.02])).unwrap();
         assert!(!twice.are_coarse());
         assert_eq!(Times::of(&[], &[]), None);
+    }
+
+    #[test]
+    fn a_clock_is_another_one_by_stamps_of_the_future_or_a_delay_without_pairs() {
+        for (of_first_s, of_second_s, are_apart, is_other) in [
+            (-0.02, 0.3, false, true),
+            (0.3, -0.02, true, true),
+            (0.3, -0.02, false, false),
+            (-0.02, -0.4, true, false),
+            (-0.02, -5.0, true, true),
+            (-0.02, -5.0, false, false),
+            (3600.3, 3600.0, false, false),
+            (0.2, 0.3, true, false),
+        ] {
+            let off_s = other_clock_s(of_first_s, of_second_s, are_apart);
+            assert_eq!(off_s, is_other.then_some(of_second_s - of_first_s));
+        }
     }
 
     #[test]

@@ -180,10 +180,10 @@ impl Inspection {
             self.usable.push("detections");
         }
         self.usable.extend(facts.sensor_topics.keys());
-        let [colour, depth] = [&facts.colour_topic, &facts.depth_topic]
-            .map(|topic| scan.topics.get(topic.as_ref()?).map(|topic| &topic.stamps[..]));
+        let [colour, depth] =
+            [&facts.colour_topic, &facts.depth_topic].map(|topic| scan.topics.get(topic.as_ref()?));
         let both = colour.zip(depth);
-        self.skew = both.and_then(|(colour, depth)| Skew::between(colour, depth, tolerance_s));
+        self.skew = both.and_then(|(colour, depth)| depth.skew_from(colour, tolerance_s));
     }
 
     /// Returns the topic with that name.
@@ -263,7 +263,10 @@ impl Inspection {
             writeln!(f, "  stereo baseline {baseline:.4} m")?;
         }
         if let Some(skew) = self.skew {
-            writeln!(f, "  depth {:+.1} ms after colour", 1e3 * skew.median_s)?;
+            match skew.other_clock() {
+                Some(words) => writeln!(f, "  depth: {words}")?,
+                None => writeln!(f, "  depth {:+.1} ms after colour", 1e3 * skew.median_s)?,
+            }
         }
         self.write_usable(f)
     }
@@ -278,7 +281,7 @@ impl fmt::Display for TopicFacts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}  {}  {}", self.topic, self.schema, counted(self.count, "message"))?;
         if let Some(rate) = self.rate_hz {
-            write!(f, ", {rate:.2} Hz")?;
+            write!(f, ", recorded at {rate:.2} Hz")?;
         }
         if let Some(image) = &self.image {
             write!(f, ", {}", image.pixels)?;

@@ -10,7 +10,7 @@ use tagalong_core::Stamp;
 use tagalong_math::counted;
 
 use crate::camera_info::is_blank;
-use crate::clock::Times;
+use crate::clock::{Times, constant_lag_s, other_clock_s};
 use crate::hashing::Hashing;
 use crate::images::{
     CloudAxes, CloudCamera, Codec, Content, H264, ImageError, NO_PARAMETERS, Packet,
@@ -25,6 +25,7 @@ use crate::msgs::{
 use crate::packed::LogFile;
 use crate::sensors::SensorType;
 use crate::tf::{TfBuffer, plain};
+use crate::timing::Skew;
 use crate::topics::{Stream, TopicName, part_of};
 use crate::walk::{Channel, Counters, Message};
 use crate::walker::LogWalker;
@@ -498,6 +499,22 @@ impl Topic {
         let [stamps_same, recorded_same] = [&self.stamps, &self.recorded]
             .map(|stamps| stamps.windows(2).all(|pair| pair[0] == pair[1]));
         self.stamps.len() > 1 && stamps_same && !recorded_same
+    }
+
+    /// Returns the offset of its images from those of a first topic, with that of its clock; `None` if
+    /// either has no image.
+    pub(crate) fn skew_from(&self, first: &Self, tolerance_s: f64) -> Option<Skew> {
+        let skew = Skew::between(&first.stamps, &self.stamps, tolerance_s)?;
+        Some(Skew { clock_s: self.clock_from(first, skew.paired == 0.0), ..skew })
+    }
+
+    /// Returns the time by which its stamps are later than those of a first topic, s, if the recording
+    /// times show that the two have different clocks. `are_apart`: none of its stamps is near one of the
+    /// first.
+    pub(crate) fn clock_from(&self, first: &Self, are_apart: bool) -> Option<f64> {
+        let of_first_s = constant_lag_s(&first.stamps, &first.recorded)?;
+        let own_s = constant_lag_s(&self.stamps, &self.recorded)?;
+        other_clock_s(of_first_s, own_s, are_apart)
     }
 
     /// Returns the reason why no message can be used, although all can be decoded.

@@ -44,6 +44,9 @@ pub struct Skew {
     /// Fraction of the first topic's images that have an image of the second topic within the
     /// tolerance.
     pub paired: f64,
+    /// Time by which the second topic's stamps are later than those of the first, s, if the recording
+    /// times show that the two have different clocks.
+    pub clock_s: Option<f64>,
 }
 
 impl Skew {
@@ -56,8 +59,25 @@ impl Skew {
         Some(Self {
             median_s: median(offsets.iter().copied())?,
             paired: paired as f64 / offsets.len() as f64,
+            clock_s: None,
         })
     }
+
+    /// Returns the words for a second topic of images with another clock; `None` if nothing shows that.
+    pub fn other_clock(&self) -> Option<String> {
+        self.clock_s.map(|off_s| clock_words(off_s, "colour images"))
+    }
+}
+
+/// Returns the words for stamps that are later by a time, s, than those of other messages, as the
+/// recording times show.
+pub(crate) fn clock_words(off_s: f64, others: &str) -> String {
+    let side = if off_s > 0.0 { "later" } else { "earlier" };
+    format!(
+        "compared by the times of recording, its stamps are {:.2} s {side} than those of the {others}: \
+         another clock",
+        off_s.abs()
+    )
 }
 
 /// Returns the offset from a given time to the nearest of sorted stamps, s.

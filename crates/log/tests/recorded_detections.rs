@@ -221,9 +221,9 @@ fn read_saved(saved: &SavedLog, input: &InputSettings) -> (usize, FrameSource) {
 fn detections_that_belong_to_no_frame_are_lost_with_the_offset_and_the_remedy() {
     for (offset_s, offset, remedy) in [
         (0.04, "0.040 s after", "`pair_tolerance_s = 0.06`"),
-        (-2.0, "2.000 s before", "and set `pair_tolerance_s = 0.07`"),
-        (3600.0, "3600.000 s after", "`--stamps recording`"),
-        (-1.6e9, "s before it, by another clock", "and set `pair_tolerance_s = 0.07`"),
+        (-2.0, "2.05 s earlier than those of the frames", "and set `pair_tolerance_s = 0.07`"),
+        (3600.0, "3599.95 s later than those of the frames", "`--stamps recording`"),
+        (-1.6e9, "s earlier than those of the frames", "and set `pair_tolerance_s = 0.07`"),
     ] {
         let saved = stamped(|index| stamp(index).plus_seconds(offset_s), true);
         let (seen, source) = read_saved(&saved, &InputSettings::default());

@@ -172,12 +172,20 @@ fn cases() -> Vec<Case> {
         case("black", grey(3), "exposure: bad", "longer"),
         case("white", grey(255), "exposure: bad", "shorter"),
         case("late depth", with_depth_stamp(|_, at| at + 28_000_000), "skew: warn", "capture"),
+        case(
+            "a clock ahead",
+            with_depth_stamp(|_, at| at + 300_000_000),
+            "skew: bad",
+            "stamps = \"recording\"",
+        ),
+        case("a lens that is assumed", without(&["camera_info"]), "mount: unknown", ""),
+        case("a view that is assumed", without(&["camera_info"]), "heads: unknown", ""),
         case("two thirds of depth lost", thinned("aligned_depth", 3), "skew: ok", ""),
         case(
             "another clock",
             with_depth_stamp(|_, at| at + 600_000_000_000),
             "skew: bad",
-            "capture",
+            "stamps = \"recording\"",
         ),
         case(
             "a clock that jumps back",
@@ -452,6 +460,17 @@ speed_mps = 0.5
 path = [[4.0, 4.4], [4.0, 1.5]]
 speed_mps = 0.6
 ";
+
+#[test]
+fn a_scanner_that_drives_without_odometry_is_told_by_its_rays() {
+    let home = tempfile::tempdir().unwrap();
+    let log = simulated(home.path(), SCANNER, &["/camera", "/odom"]);
+    let (_, said) = doctor(&root().join("configs/laser-legs.toml"), &log, &[]);
+    let driven = finding(&said, "odometry");
+    let measured = driven["measured"].as_str().unwrap();
+    assert!(driven["severity"] != "ok", "{driven:#}");
+    assert!(measured.contains("% of the rays change by more than 0.2 m in a second"), "{driven:#}");
+}
 
 #[test]
 fn of_a_laser_log_lasers_are_spoken_of() {

@@ -334,7 +334,7 @@ const CAUSES: [Cause; 14] = [
     Cause {
         name: "stamps of another clock",
         write: |log, message, _| changed(log, message, |image| later(&mut image.header, 3600.0)),
-        words: &["by another clock", "`--stamps recording`"],
+        words: &["another clock", "`--stamps recording`"],
     },
     Cause {
         name: "stamps that are not set",

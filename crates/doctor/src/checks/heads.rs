@@ -31,6 +31,10 @@ pub fn heads(evidence: &Evidence) -> Option<Finding> {
         let measured = "not known: height and tilt of the camera are assumed";
         return Some(Finding::new("heads", Severity::Unknown, measured));
     }
+    if evidence.is_lens_assumed() {
+        let measured = "not known: the lens is assumed, and with it the field of view";
+        return Some(Finding::new("heads", Severity::Unknown, measured));
+    }
     let Some(range) = head_range(camera) else {
         let measured = format!("no head ({TOP_M} m) is in the image at any distance up to 8 m");
         let finding = Finding::new("heads", Severity::Bad, measured);

@@ -19,7 +19,7 @@ pub fn intrinsics(evidence: &Evidence) -> Option<Finding> {
     }
     let camera = evidence.samples.camera.as_ref()?;
     let Lens::Pinhole(lens) = &camera.lens else { return None };
-    if evidence.inspection.facts.calibration_topic.is_none() {
+    if evidence.is_lens_assumed() {
         let remedy = "record its camera_info, and name it:\n[input] colour_info_topic = \"...\"";
         let measured = "none in the log: a field of view of 53 degrees is assumed".to_owned();
         return Some(about_lens(Severity::Warn, measured).remedy(remedy));

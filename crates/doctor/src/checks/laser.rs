@@ -20,8 +20,10 @@ pub fn scanners(evidence: &Evidence) -> Vec<Finding> {
         if scans.count == 0 && !evidence.inputs.uses(Input::Laser) {
             continue;
         }
-        let rate_hz = evidence.inspection.topic(topic).and_then(|topic| topic.rate_hz);
-        found.push(judge(topic, rate_hz, evidence.reading.made, scans));
+        let facts = evidence.inspection.topic(topic);
+        let period_s = facts.and_then(|facts| facts.timing).map(|timing| timing.median_period_s);
+        let rate = rate_words(period_s, facts.and_then(|facts| facts.rate_hz));
+        found.push(judge(topic, &rate, evidence.reading.made, scans));
     }
     found
 }
@@ -33,15 +35,13 @@ fn topics<'a>(first: &'a str, account: &'a InputAccount) -> Vec<&'a str> {
     std::iter::once(first).chain(further).collect()
 }
 
-/// Judges the scans of one scanner, given the number of frames.
-fn judge(topic: &str, rate_hz: Option<f64>, frames: u64, scans: &Scans) -> Finding {
+/// Judges the scans of one scanner, given its rate in words and the number of frames.
+fn judge(topic: &str, rate: &str, frames: u64, scans: &Scans) -> Finding {
     if scans.count == 0 {
         return Finding::new("laser", Severity::Warn, format!("{topic}: no usable scan"))
             .why("scans without angles, ranges or a pose are left out")
             .remedy("publish tf from the robot to the scanner; [input] laser_topic = \"...\"");
     }
-    let rate =
-        rate_hz.map_or_else(|| "one scan".to_owned(), |hz| format!("{hz:.1} scans a second"));
     let step_deg = scans.increment_rad.to_degrees();
     let valid = scans.valid();
     // Outdoors a scanner has no reflection in most directions, which is not a fault.
@@ -84,6 +84,16 @@ fn wrong_height(is_wrong: bool) -> Severity {
     if is_wrong { Severity::Warn } else { Severity::Ok }
 }
 
+/// Returns the rate from the median period of the stamps, s, as in the finding `rate`; without one from
+/// the rate of recording, which transport may change.
+fn rate_words(period_s: Option<f64>, recorded_hz: Option<f64>) -> String {
+    match (period_s, recorded_hz) {
+        (Some(period_s), _) => format!("{:.1} scans a second", 1.0 / period_s),
+        (None, Some(recorded_hz)) => format!("scans recorded at {recorded_hz:.1} a second"),
+        (None, None) => "one scan".to_owned(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use tagalong_log::TopicUse;
@@ -101,6 +111,13 @@ mod tests {
             could_be: None,
             remedy: None,
         }
+    }
+
+    #[test]
+    fn the_rate_of_scans_is_that_of_their_stamps() {
+        assert_eq!(rate_words(Some(0.1), Some(408.8)), "10.0 scans a second");
+        assert_eq!(rate_words(None, Some(408.8)), "scans recorded at 408.8 a second");
+        assert_eq!(rate_words(None, None), "one scan");
     }
 
     #[test]
@@ -124,16 +141,17 @@ mod tests {
             increment_rad: 0.01,
             farthest_m: 5.0,
             height_m: 0.3,
+            ..Scans::default()
         };
-        let told = judge("/rear", Some(10.0), 40, &good);
+        let told = judge("/rear", "10.0 scans a second", 40, &good);
         assert_eq!(told.severity, Severity::Ok, "{told:?}");
         assert!(!told.measured.contains("no usable scan"), "{told:?}");
-        let blind = Scans { readings: 0, farthest_m: 0.0, ..good };
-        let told = judge("/rear", Some(10.0), 40, &blind);
+        let blind = Scans { readings: 0, farthest_m: 0.0, ..good.clone() };
+        let told = judge("/rear", "10.0 scans a second", 40, &blind);
         assert_eq!(told.severity, Severity::Bad, "{told:?}");
         assert!(told.remedy.unwrap().contains("few rays have a return"));
         let ending = Scans { count: 20, readings: 20 * 180, ..good };
-        let told = judge("/rear", Some(10.0), 40, &ending);
+        let told = judge("/rear", "10.0 scans a second", 40, &ending);
         assert_eq!(told.severity, Severity::Bad, "{told:?}");
         assert!(told.measured.contains("no usable scan at 20 of 40 frames"), "{told:?}");
         assert!(told.remedy.unwrap().contains("stops or pauses"));

@@ -1,6 +1,7 @@
 use super::super::evidence::Evidence;
 use super::super::finding::{Finding, Severity};
 use super::depth::doubt;
+use super::odometry::{Motion, motion};
 use super::{Alternative, better};
 
 /// Number of blobs below which shares are not significant.
@@ -9,14 +10,19 @@ const FEW_BLOBS: usize = 3;
 /// Checks that person-sized shapes that come and go have tracks.
 pub fn missed(evidence: &Evidence) -> Option<Finding> {
     let coverage = &evidence.coverage;
-    evidence.changed?;
+    if !coverage.has_depth {
+        return None;
+    }
     // Without a run there is nothing to compare with.
     if evidence.trial.frames == 0 || evidence.trial.failure.is_some() {
         return None;
     }
     if coverage.blobs == 0 {
-        let measured =
-            doubt(evidence).unwrap_or("no shape of a person's size comes or goes in depth");
+        let measured = match (doubt(evidence), evidence.changed) {
+            (Some(doubt), _) => doubt,
+            (None, Some(_)) => "no shape of a person's size comes or goes in depth",
+            (None, None) => "not known: too few views of depth show the same places",
+        };
         return Some(Finding::new("missed", Severity::Unknown, measured));
     }
     let share = coverage.unexplained as f64 / coverage.blobs as f64;
@@ -41,8 +47,17 @@ pub fn missed(evidence: &Evidence) -> Option<Finding> {
             example.bearing_deg.abs()
         );
     }
-    if let Some((cause, count)) = evidence.causes.first() {
-        measured += &format!(". Cause in {count} of {}: {}", coverage.unexplained, cause.why);
+    match (motion(evidence), evidence.causes.first()) {
+        (Motion::Likely, _) => {
+            measured +=
+                "; things at rest come and go, too, where the robot moves (finding odometry)";
+        }
+        (doubt, Some((cause, count))) => {
+            let lead =
+                if doubt == Motion::Possible { "If the robot is at rest, cause" } else { "Cause" };
+            measured += &format!(". {lead} in {count} of {}: {}", coverage.unexplained, cause.why);
+        }
+        (_, None) => {}
     }
     let finding = Finding::new("missed", severity, measured)
         .figure("blobs", coverage.blobs as f64)
@@ -54,6 +69,9 @@ pub fn missed(evidence: &Evidence) -> Option<Finding> {
 
 /// Returns the change that helped most on this log, or else general advice.
 fn remedy(evidence: &Evidence) -> String {
+    if motion(evidence) == Motion::Likely {
+        return "see the finding odometry first".to_owned();
+    }
     let now = &evidence.coverage;
     match better(evidence, |other| other.unexplained < now.unexplained) {
         Some(Alternative { change, coverage }) => format!(

@@ -14,6 +14,10 @@ pub fn mount(evidence: &Evidence) -> Option<Finding> {
     {
         return None;
     }
+    if evidence.is_lens_assumed() {
+        let measured = "not known: the lens is assumed, and the floor is measured with it";
+        return Some(Finding::new("mount", Severity::Unknown, measured));
+    }
     let height = median(floors.iter().map(|(ground, camera)| ground.height_m - camera.height_m()))?;
     let pitch =
         median(floors.iter().map(|(ground, camera)| {

@@ -44,8 +44,9 @@ pub struct Views {
 pub struct Scenery {
     /// One image for each view, in the order of time.
     pub moments: Vec<Moment>,
-    /// Share of all points that have come or gone.
-    pub changed: f64,
+    /// Share of the points that came or went, of those whose place enough other views show; `None`
+    /// without any.
+    pub changed: Option<f64>,
 }
 
 /// Classified depth image.
@@ -81,10 +82,14 @@ impl Views {
                 let others = self.others(at);
                 let mut plan = Plan::default();
                 for point in self.views[at].points().filter(|p| HEIGHTS_M.contains(&p.z)) {
-                    let is_changed = has_changed(&point, &others);
+                    let (through, onto) = looks_at(&point, &others);
+                    let is_changed = has_changed(through, onto);
                     plan.add(&point, is_changed);
-                    points += 1;
-                    changed += u64::from(is_changed);
+                    // A view looks onto its own points, so that one more look is needed.
+                    if through + onto > MIN_THROUGH {
+                        points += 1;
+                        changed += u64::from(is_changed);
+                    }
                 }
                 plan
             })
@@ -96,7 +101,8 @@ impl Views {
             plan,
             view,
         });
-        Scenery { moments: moments.collect(), changed: changed as f64 / points.max(1) as f64 }
+        let share = (points > 0).then(|| changed as f64 / points as f64);
+        Scenery { moments: moments.collect(), changed: share }
     }
 
     /// Returns some views close in time to one, spread evenly.
@@ -134,8 +140,8 @@ impl Moment {
     }
 }
 
-/// Returns true if other views look through a point.
-fn has_changed(point: &Point3<f64>, others: &[&View]) -> bool {
+/// Returns the numbers of views that look through a point, and onto it.
+fn looks_at(point: &Point3<f64>, others: &[&View]) -> (u32, u32) {
     let mut through = 0;
     let mut onto = 0;
     for view in others {
@@ -145,6 +151,11 @@ fn has_changed(point: &Point3<f64>, others: &[&View]) -> bool {
             Look::Unknown => {}
         }
     }
+    (through, onto)
+}
+
+/// Returns true if enough views look through a point, of those that look through or onto it.
+fn has_changed(through: u32, onto: u32) -> bool {
     through >= MIN_THROUGH && f64::from(through) >= MIN_SHARE * f64::from(through + onto)
 }
 
@@ -178,7 +189,7 @@ mod tests {
             }
         }
         assert_eq!(blobs(&Room::default().seen(40, 0.0).judge()), 0);
-        assert!(scenery.changed < 0.3, "{}", scenery.changed);
+        assert!(scenery.changed.unwrap() < 0.3, "{:?}", scenery.changed);
     }
 
     #[test]
@@ -195,10 +206,10 @@ mod tests {
     #[test]
     fn ego_motion_is_taken_out() {
         let known = Room::default().seen(40, 0.3).judge();
-        assert!(known.changed < 0.05, "{}", known.changed);
+        assert!(known.changed.unwrap() < 0.05, "{:?}", known.changed);
         assert_eq!(blobs(&known), 0);
         let unknown = Room { odometry: false, ..Room::default() }.seen(40, 0.3).judge();
-        assert!(unknown.changed > 0.2, "{}", unknown.changed);
+        assert!(unknown.changed.unwrap() > 0.2, "{:?}", unknown.changed);
     }
 
     #[test]
@@ -215,6 +226,13 @@ mod tests {
                 assert!(place.y.abs() >= 0.9 || moment.blobs.is_empty(), "{thing:?}");
             }
         }
+    }
+
+    #[test]
+    fn without_other_views_nothing_is_known_of_changes() {
+        assert_eq!(Views::of(1).judge().changed, None);
+        assert_eq!(Room::default().seen(2, 0.0).judge().changed, None);
+        assert_eq!(Room::default().seen(3, 0.0).judge().changed, Some(0.0));
     }
 
     #[test]

@@ -4,7 +4,7 @@
 use super::kinds::{is_odometry, odometry_rank};
 use super::problems::{Problem, RECORDING, WHOLE_SECONDS, clock_problem};
 use super::{best_of, named};
-use crate::clock::{Times, constant_lag_s};
+use crate::clock::{DELAY_S, FUTURE_S, Times, constant_lag_s};
 use crate::scan::{Scan, Topic};
 use crate::source::robot_frame;
 use crate::tf::plain;
@@ -65,13 +65,6 @@ const ODOMETRY_FRAME: &str = "odom";
 /// Lead of the odometry stamps over those of the frames beyond which its clock must be a different
 /// one, s.
 const LEAD_S: f64 = 0.5;
-/// Lead of stamps over the recording times beyond which their clock is not that of the recording,
-/// s.
-const FUTURE_S: f64 = 0.25;
-/// Delay of the odometry stamps behind those of the frames beyond which its clock must be a
-/// different one, s. Odometry that is computed from images may have smaller delays with right
-/// stamps.
-const DELAY_S: f64 = 1.0;
 
 /// Returns the reason why odometry cannot give the poses of the frames.
 pub(super) fn odometry_problem(scan: &Scan, primary: &str, odometry: &str) -> Option<Problem> {

@@ -7,7 +7,7 @@ use crate::clock::Times;
 use crate::scan::{Scan, Topic};
 use crate::sensors::recent::NEAR_S as NEAR_SCAN_S;
 use crate::source::robot_frame;
-use crate::timing::Skew;
+use crate::timing::{Skew, Timing, clock_words};
 
 /// Reason, with the setting or the action that solves the problem.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -65,24 +65,60 @@ pub(super) fn pairing_problem(
     if second.has_constant_stamps() && !first.has_constant_stamps() {
         return Problem::new("its stamps never change", RECORDING);
     }
-    let skew = Skew::between(&first.stamps, &second.stamps, tolerance_s)?;
+    let skew = second.skew_from(first, tolerance_s)?;
+    if let Some(why) = skew.other_clock() {
+        return Problem::new(why, RECORDING);
+    }
     if skew.paired > 0.0 {
         return None;
     }
-    let off_s = skew.median_s;
-    let size_s = off_s.abs();
+    let apart_s = other_clock(first, second);
+    let off_s = apart_s.unwrap_or(skew.median_s);
+    let near_s = near_s(first, second);
     let times = if scan.has_recording_times { "times of recording" } else { "stamps" };
+    let offset =
+        if off_s.abs() < near_s || apart_s.is_some() { offset(off_s) } else { around(off_s) };
     let why = format!(
-        "none of its images is within {:.0} ms of a colour image: by their {times} they come {} it",
+        "none of its images is within {:.0} ms of a colour image: by their {times} they come {offset} it",
         1e3 * tolerance_s,
-        offset(off_s)
     );
-    match (size_s > OTHER_CLOCK_S, scan.has_recording_times) {
-        (true, true) => Problem::new(why, TOGETHER),
-        (true, false) => Problem::new(format!("{why}, by another clock"), RECORDING),
-        (false, true) => Problem::new(why, wider_tolerance(size_s)),
-        (false, false) => Problem::new(why, format!("{}, or {RECORDING}", wider_tolerance(size_s))),
+    if off_s.abs() < near_s {
+        return Problem::new(why, wider_tolerance(off_s.abs()));
     }
+    if is_recorded_apart(first, second) {
+        return Problem::new(why, TOGETHER);
+    }
+    let why = if apart_s.is_some() { format!("{why}, by another clock") } else { why };
+    Problem::new(why, at_capture(scan, first, second, tolerance_s))
+}
+
+/// Share of the period of images within which a neighbour in time is that image and not the next one.
+const NEAR_PERIODS: f64 = 0.48;
+
+/// Returns the offset up to which images of two topics are neighbours without doubt, s: nearly half the
+/// period of the faster one.
+pub(super) fn near_s(first: &Topic, second: &Topic) -> f64 {
+    let periods =
+        [first, second].map(|topic| Timing::of(&topic.stamps).map(|it| it.median_period_s));
+    let shortest_s = periods.into_iter().flatten().reduce(f64::min);
+    shortest_s.map_or(OTHER_CLOCK_S, |period_s| NEAR_PERIODS * period_s)
+}
+
+/// Returns the remedy for images whose stamps are too far apart for a wider tolerance: the recording
+/// times if these bring them together.
+pub(super) fn at_capture(scan: &Scan, first: &Topic, second: &Topic, tolerance_s: f64) -> String {
+    let recorded = Skew::between(&second.recorded, &first.recorded, tolerance_s);
+    let is_cured = recorded.is_some_and(|skew| skew.paired >= MOST_PAIRED);
+    if is_cured && !scan.has_recording_times {
+        RECORDING.to_owned()
+    } else {
+        "let the driver stamp both images at capture".to_owned()
+    }
+}
+
+/// Returns an offset to images on both sides in words.
+fn around(off_s: f64) -> String {
+    format!("{:.3} s before or after", off_s.abs())
 }
 
 /// Returns a time offset in words.
@@ -117,16 +153,21 @@ pub(super) fn detections_problem(
     }
     // Detections may be slower than images, so each of them counts rather than each image.
     let skew = Skew::between(&messages.stamps, &frames.stamps, tolerance_s)?;
+    if let Some(off_s) = messages.clock_from(frames, skew.paired == 0.0) {
+        let why = clock_words(off_s, "frames");
+        return Problem::new(why, recording_of(frames, messages, tolerance_s));
+    }
     if skew.paired > 0.0 {
         return None;
     }
     let other_clock_s = other_clock(frames, messages);
     let off_s = other_clock_s.unwrap_or(-skew.median_s);
     let times = if scan.has_recording_times { "times of recording" } else { "stamps" };
+    let is_near = off_s.abs() < near_s(frames, frames);
+    let offset = if is_near || other_clock_s.is_some() { offset(off_s) } else { around(off_s) };
     let why = format!(
-        "none of its messages is within {:.0} ms of a frame: by their {times} they come {} it",
+        "none of its messages is within {:.0} ms of a frame: by their {times} they come {offset} it",
         1e3 * tolerance_s,
-        offset(off_s)
     );
     let is_recorded_apart = scan.has_recording_times || is_recorded_apart(frames, messages);
     match (other_clock_s, is_recorded_apart) {
@@ -135,7 +176,8 @@ pub(super) fn detections_problem(
             let remedy = recording_of(frames, messages, tolerance_s);
             Problem::new(format!("{why}, by another clock"), remedy)
         }
-        (None, _) => Problem::new(why, wider_tolerance(off_s.abs())),
+        (None, _) if is_near => Problem::new(why, wider_tolerance(off_s.abs())),
+        (None, _) => Problem::new(why, "let the detector copy the stamps of the images"),
     }
 }
 
@@ -168,6 +210,9 @@ pub(super) fn scan_times_problem(scan: &Scan, primary: &str, scanner: &str) -> O
     let skew = Skew::between(&scans.stamps, &frames.stamps, NEAR_SCAN_S)?;
     if skew.paired > 0.0 {
         return None;
+    }
+    if let Some(off_s) = scans.clock_from(frames, true) {
+        return Problem::new(clock_words(off_s, "frames"), RECORDING);
     }
     let times = if scan.has_recording_times { "times of recording" } else { "stamps" };
     let why = format!(

@@ -4,7 +4,8 @@ use tagalong_core::Stamp;
 use tagalong_math::median;
 
 use super::problems::{
-    Problem, RECORDING, TOGETHER, WHOLE_SECONDS, pairing_problem, wider_tolerance,
+    Problem, RECORDING, TOGETHER, WHOLE_SECONDS, at_capture, near_s, pairing_problem,
+    wider_tolerance,
 };
 use crate::scan::{Scan, Topic};
 use crate::timing::{Skew, Timing, nearest};
@@ -21,6 +22,8 @@ const EVEN: f64 = 0.75;
 const LONGEST_GAP: f64 = 3.0;
 /// Fraction of the images of a slower topic that must belong to a frame.
 const MOST_PAIRED: f64 = 0.9;
+/// Part of the time that a topic lacks by its stamps which it has to lack by the recording times, too.
+const RECORDED_PART: f64 = 0.5;
 /// Time between a frame and its partner in the log from which on it is too long to wait, s.
 const LONG_S: f64 = 1.0;
 
@@ -52,14 +55,14 @@ pub(crate) fn unpaired(
             return Some(Problem { why, remedy: RECORDING.to_owned() });
         }
     }
-    if let Some(why) = is_short(&frames.stamps, partners, tolerance_s) {
+    if let Some(why) = is_short(frames, partners, tolerance_s) {
         return Some(Problem { why, remedy: TOGETHER.to_owned() });
     }
     if is_slower(frames, partners, tolerance_s) {
         return None;
     }
     recorded_apart(frames, partners, tolerance_s)
-        .or_else(|| Some(missing_or_apart(frames, partners, tolerance_s)))
+        .or_else(|| Some(missing_or_apart(scan, frames, partners, tolerance_s)))
 }
 
 /// Returns true for stamps that are rounded to whole seconds.
@@ -96,13 +99,15 @@ fn recorded_apart(frames: &Topic, partners: &Topic, tolerance_s: f64) -> Option<
 
 /// Returns a message about partners that begin late or end early, if most frames without a partner
 /// are there.
-fn is_short(frames: &[Stamp], partners: &Topic, tolerance_s: f64) -> Option<String> {
+fn is_short(frames: &Topic, partners: &Topic, tolerance_s: f64) -> Option<String> {
     let times = partners.times()?;
+    let of_frames = frames.times()?;
     let period_s = Timing::of(&partners.stamps).map_or(0.0, |timing| timing.median_period_s);
     let margin_s = period_s.max(tolerance_s);
     let mut sorted = partners.stamps.clone();
     sorted.sort();
     let without = frames
+        .stamps
         .iter()
         .filter(|at| nearest(&sorted, **at).is_none_or(|offset_s| offset_s.abs() > tolerance_s));
     let without: Vec<Stamp> = without.copied().collect();
@@ -111,12 +116,25 @@ fn is_short(frames: &[Stamp], partners: &Topic, tolerance_s: f64) -> Option<Stri
     if 2 * (early + late) <= without.len() {
         return None;
     }
-    let first = frames.iter().min()?;
-    let last = frames.iter().max()?;
-    Some(if early > late {
-        format!("it begins {:.1} s after the first frame", times.first.seconds_since(*first))
+    let is_late = early > late;
+    let missing_s = if is_late {
+        times.first.seconds_since(of_frames.first)
     } else {
-        format!("it ends {:.1} s before the last frame", last.seconds_since(times.last))
+        of_frames.last.seconds_since(times.last)
+    };
+    let recorded_s = if is_late {
+        times.first_recorded.seconds_since(of_frames.first_recorded)
+    } else {
+        of_frames.last_recorded.seconds_since(times.last_recorded)
+    };
+    // Stamps alone may be those of another clock.
+    if recorded_s < RECORDED_PART * missing_s {
+        return None;
+    }
+    Some(if is_late {
+        format!("it begins {missing_s:.1} s after the first frame")
+    } else {
+        format!("it ends {missing_s:.1} s before the last frame")
     })
 }
 
@@ -148,14 +166,19 @@ fn is_slower(frames: &Topic, partners: &Topic, tolerance_s: f64) -> bool {
 }
 
 /// Returns the problem of partners that are missing, or of stamps that are too far apart.
-fn missing_or_apart(frames: &Topic, partners: &Topic, tolerance_s: f64) -> Problem {
+fn missing_or_apart(scan: &Scan, frames: &Topic, partners: &Topic, tolerance_s: f64) -> Problem {
     let mut sorted = partners.stamps.clone();
     sorted.sort();
     let offsets = frames.stamps.iter().filter_map(|at| nearest(&sorted, *at)).map(f64::abs);
     let apart_s = median(offsets.filter(|offset_s| *offset_s > tolerance_s)).unwrap_or(0.0);
     if partners.count as f64 >= MOST_PAIRED * frames.count as f64 {
         let why = format!("the stamps of half of them are {:.0} ms or more apart", 1e3 * apart_s);
-        return Problem { why, remedy: wider_tolerance(apart_s) };
+        let remedy = if apart_s < near_s(frames, partners) {
+            wider_tolerance(apart_s)
+        } else {
+            at_capture(scan, frames, partners, tolerance_s)
+        };
+        return Problem { why, remedy };
     }
     let why = format!("it has {} images, and there are {} frames", partners.count, frames.count);
     let remedy = "record fewer or compressed topics, so that none of its images is dropped";

@@ -32,7 +32,7 @@ fn told(source: &FrameSource) -> String {
 #[test]
 fn frames_without_depth_are_lost_with_the_measured_cause() {
     type Depth<'a> = (&'a dyn Fn(u32, f64) -> Option<f64>, &'a str, &'a str);
-    let cases: [Depth<'_>; 6] = [
+    let cases: [Depth<'_>; 11] = [
         (&|_, t| Some(t.floor()), "its stamps are rounded to whole seconds", "--stamps recording"),
         (&|_, t| (t < 0.95).then_some(t), "it ends 1.0 s before the last frame", "record it"),
         (&|_, t| (t > 0.95).then_some(t), "it begins 1.0 s after the first frame", "record it"),
@@ -42,7 +42,24 @@ fn frames_without_depth_are_lost_with_the_measured_cause() {
             "`pair_tolerance_s = 0.06`",
         ),
         (&|index, t| (index % 3 > 0).then_some(t), "it has 13 images, and there are 20", "record"),
-        (&|_, t| Some(t + 3600.0), "by another clock", "--stamps recording"),
+        (
+            &|_, t| Some(t + 3600.0),
+            "3600.00 s later than those of the colour images",
+            "--stamps rec",
+        ),
+        (
+            &|_, t| Some(t + 5.0),
+            "5.00 s later than those of the colour images",
+            "--stamps recording",
+        ),
+        (&|_, t| Some(t - 5.0), "5.00 s earlier than those of the colour", "--stamps recording"),
+        (
+            &|_, t| Some(t + 1.0),
+            "1.00 s later than those of the colour images",
+            "--stamps recording",
+        ),
+        (&|_, t| Some(t - 0.9), "are 500 ms or more apart", "--stamps recording"),
+        (&|_, t| Some(t + 0.05), "they come 0.050 s before or after it", "--stamps recording"),
     ];
     for (depth, cause, remedy) in cases {
         let saved = ride(depth);
@@ -55,6 +72,19 @@ fn frames_without_depth_are_lost_with_the_measured_cause() {
         assert_eq!(made, FRAMES as usize);
         assert!(!source.data_lost(), "{cause}: {:?}", source.notes());
     }
+}
+
+/// Nearly all frames have depth, of another moment.
+#[test]
+fn depth_with_stamps_of_the_future_is_told_where_it_pairs() {
+    let saved = ride(|_, t| Some(t + 0.3));
+    let (_, source) = read(&saved, DEPTH);
+    let told = source.account().used_as("depth").unwrap().to_string();
+    assert!(told.contains("its stamps are 0.30 s later than those of the colour images"), "{told}");
+    assert!(told.contains("--stamps recording"), "{told}");
+    // Stamps that agree are right, however late the images are recorded.
+    let (_, source) = read(&ride(|_, t| Some(t)), DEPTH);
+    assert_eq!(source.account().used_as("depth").unwrap().problem, None);
 }
 
 #[test]
