@@ -28,6 +28,12 @@ impl Freshness {
         fresh.is_some()
     }
 
+    /// Takes the newest reading as infinitely old, because what it showed is forgotten: the same reading
+    /// again is not new.
+    pub(super) fn clear(&mut self) {
+        self.age_s = self.age_s.map(|_| f64::INFINITY);
+    }
+
     /// Returns true if the last frame had a reading, new or not.
     pub(super) fn delivers(self) -> bool {
         self.delivers

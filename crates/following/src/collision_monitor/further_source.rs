@@ -45,6 +45,7 @@ impl FurtherSource {
 
     /// Forgets all places, but neither that the source once delivered nor that it was frozen.
     pub(super) fn clear(&mut self) {
+        self.freshness.clear();
         match &mut self.state {
             SourceState::Scan(scan) => scan.clear(),
             SourceState::Depth(depth) => depth.clear(),

@@ -116,13 +116,16 @@ impl CollisionMonitor {
         }
     }
 
-    /// Forgets all places, after a jump of the clock, but neither which sensors there are nor that one
-    /// was frozen.
+    /// Forgets all positions after a jump of the clock: each sensor counts as silent until its next new
+    /// reading. Which sensors there are, and that one was frozen, is not forgotten.
     pub(crate) fn clear(&mut self) {
         self.depth.clear();
+        self.depth_age.clear();
         self.laser.clear();
-        for (laser, _) in &mut self.further_lasers {
+        self.laser_age.clear();
+        for (laser, age) in &mut self.further_lasers {
             laser.clear();
+            age.clear();
         }
         for source in &mut self.sources {
             source.clear();

@@ -653,6 +653,7 @@ fn after_a_jump_of_the_clock_no_place_is_known() {
     assert!(speed(&monitor) < 0.5, "{}", speed(&monitor));
     monitor.clear();
     assert_eq!(speed(&monitor), Allowance::FREE.most);
+    assert_eq!(monitor.stop_reason(0.5), Some(Reason::Silent), "until a new scan");
 }
 
 /// A wall is 4 m away; a scan meets something at 0.9 m.

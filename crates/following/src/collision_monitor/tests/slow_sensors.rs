@@ -187,3 +187,24 @@ fn a_sensor_that_contradicted_the_odometry_stays_frozen_until_the_robot_is_armed
     monitor.arm();
     assert_eq!(same_picture(&mut monitor, 40..60, 0.0), None);
 }
+
+/// The newest scan of before the jump says nothing of now, also where it comes again with each frame.
+#[test]
+fn after_a_jump_of_the_clock_a_scanner_is_silent_until_its_next_scan() {
+    let mut monitor = monitor();
+    let mut reasons = Vec::new();
+    for index in 0..12 {
+        if index == 4 {
+            monitor.clear();
+        }
+        let turn = if index < 8 { 0 } else { index };
+        let stamp = Stamp::default().plus_seconds(turn as f64 * 0.1);
+        let scan = scan_at(turn, 0.0, 0.0, |_| None).with_stamp(stamp);
+        let depth = Some(depth_at(index, 0.0, 0.0));
+        let frame = frame(index, EgoMotion::at_rest(0.1), depth, Some(scan));
+        monitor.update(&frame, &frame.motion, &[], None);
+        reasons.push(monitor.stop_reason(0.5));
+    }
+    let expected = [[None; 4], [Some(Reason::Silent); 4], [None; 4]].concat();
+    assert_eq!(reasons, expected);
+}
