@@ -21,6 +21,7 @@ mod figures;
 mod follow;
 mod import;
 mod inputs;
+mod lacking;
 mod live;
 mod missing_topics;
 mod model;

@@ -5,7 +5,6 @@ pub mod broken;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
@@ -118,21 +117,11 @@ pub struct Drawn {
     pub boxes: bool,
     /// The same in space, in the frame of the camera.
     pub in_space: bool,
-    /// Frames without them; if there are some, a message follows long after the last frame.
-    pub silent: Range<u64>,
 }
 
 impl Drawn {
     pub fn of(frames: u64) -> Self {
-        Self {
-            frames,
-            depth: true,
-            twice: 0,
-            truth: Vec::new(),
-            boxes: false,
-            in_space: false,
-            silent: 0..0,
-        }
+        Self { frames, depth: true, twice: 0, truth: Vec::new(), boxes: false, in_space: false }
     }
 
     /// Writes a log of a person walking to the left, ten frames a second.
@@ -144,11 +133,6 @@ impl Drawn {
             for _ in 0..=u64::from(index == self.twice && self.twice > 0) {
                 self.write_frame(&mut log, stamp, index);
             }
-        }
-        if !self.silent.is_empty() {
-            let stamp = FIRST_NS + (self.frames + 100) * 100_000_000;
-            let header = Header::new(Stamp::from_nanos(stamp), "camera_optical");
-            log.send("/detections", stamp, &boxes(&header, self.frames));
         }
         log.send_truth(&self.truth);
         log.writer.finish().unwrap();
@@ -163,7 +147,7 @@ impl Drawn {
         if self.in_space {
             log.send("/detections", stamp, &space(&header, index));
         }
-        if self.boxes && !self.silent.contains(&index) {
+        if self.boxes {
             log.send("/detections", stamp, &boxes(&header, index));
         }
         if self.depth {
@@ -206,7 +190,7 @@ fn space(header: &Header, index: u64) -> Detection3DArray {
 }
 
 /// Columns that the walker covers.
-fn walker(index: u64) -> Range<usize> {
+fn walker(index: u64) -> std::ops::Range<usize> {
     let left = 90usize.saturating_sub(index as usize % 60);
     left..left + 26
 }

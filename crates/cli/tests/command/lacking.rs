@@ -1,0 +1,60 @@
+//! Frames that lack an input which a plugin requires: scans of a scanner that is silent for a time.
+
+use std::fs;
+use std::path::Path;
+use std::process::Output;
+
+use serde_json::Value;
+
+use crate::common::broken::{self, Changes};
+use crate::common::{messages_of, tagalong};
+
+/// A depth camera and a scanner of ten images and scans a second.
+const SCENE: &str = "
+seed = 5
+duration_s = 3.0
+[room]
+size_m = [9.0, 6.0]
+[camera]
+width = 160
+height = 120
+[robot]
+start = [0.8, 3.0]
+[laser]
+[[people]]
+path = [[4.0, 4.4], [4.0, 1.5]]
+speed_mps = 0.6
+";
+
+/// Simulates the scene, and runs over it with those scans alone that `changes` keeps.
+fn run(folder: &Path, changes: &Changes) -> Output {
+    fs::write(folder.join("scene.toml"), SCENE).unwrap();
+    let mut simulate = tagalong();
+    simulate.current_dir(folder).args(["simulate", "scene.toml", "-o", "whole.mcap"]);
+    messages_of(&simulate.output().unwrap(), 0);
+    broken::write(&folder.join("whole.mcap"), &folder.join("log.mcap"), changes);
+    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/depth-laser.toml");
+    let mut run = tagalong();
+    run.current_dir(folder).arg("run").arg(config).args(["log.mcap", "-o", "out"]);
+    run.output().unwrap()
+}
+
+#[test]
+fn frames_without_a_required_input_are_left_out_and_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let changes = Changes { thinned: Some(("scan", 10)), ..Changes::default() };
+    let told = messages_of(&run(folder.path(), &changes), 0);
+    let report = fs::read(folder.path().join("out/report.json")).unwrap();
+    let report: Value = serde_json::from_slice(&report).unwrap();
+    let frames = &report["frames"];
+    let [read, processed, lacking] =
+        ["read", "processed", "lacking"].map(|name| frames[name].as_u64().unwrap());
+    assert!(lacking > 0 && processed > 0, "{frames}");
+    assert_eq!(processed + lacking, read, "{frames}");
+    assert_eq!(report["lacking"][0]["plugin"], "laser-legs");
+    assert_eq!(report["lacking"][0]["frames"], lacking);
+    assert_eq!(report["ended"], "complete");
+    let warning = format!("warning: {lacking} of {read} frames left out, the first is frame ");
+    assert!(told.contains(&warning) && told.contains("they lack laser scans"), "{told}");
+    assert_eq!(told.matches("frames left out").count(), 1, "once: {told}");
+}
