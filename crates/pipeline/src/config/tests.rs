@@ -216,7 +216,7 @@ fn the_seed_can_be_replaced() {
 #[test]
 fn the_defaults_are_printed_under_their_documentation_and_parse() {
     let text = commented_defaults::<PipelineSettings>();
-    for key in ["[merge]", "# Most detections in a frame;", "max_detections = 1024"] {
+    for key in ["[merge]", "# Largest number of detections in a frame;", "max_detections = 1024"] {
         assert!(text.contains(key), "{key} in\n{text}");
     }
     for key in ["# [stereo]", "# method = \"semi-global\"", "# min_depth_m = 0.5"] {
