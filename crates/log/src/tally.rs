@@ -43,6 +43,16 @@ pub fn is_loss(counter: &str) -> bool {
     !NO_LOSSES.contains(&counter)
 }
 
+/// Number and fraction of the frames without a partner that are normal: cameras skip an image from
+/// time to time.
+const USUAL_COUNT: u64 = 3;
+const USUAL_SHARE: f64 = 0.1;
+
+/// Returns true if more frames have no partner than cameras normally skip.
+pub(crate) fn is_unusual(without: u64, frames: u64) -> bool {
+    without > USUAL_COUNT && without as f64 > USUAL_SHARE * frames as f64
+}
+
 /// Losses, skipped data and remarks, counted by name and described in sentences.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tally {

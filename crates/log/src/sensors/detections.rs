@@ -14,8 +14,7 @@ use crate::msgs::{
     CdrError, Definition, Detection2DArray, Detection3DArray, Header, Time, Value, decode,
 };
 use crate::pairing::{Payload, Waiting};
-use crate::tally::Tally;
-use crate::topics::is_unusual;
+use crate::tally::{Tally, is_unusual};
 use crate::walk::{Channel, Message};
 
 const BOXES: &str = "vision_msgs/Detection2DArray";

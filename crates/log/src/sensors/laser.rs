@@ -13,8 +13,7 @@ pub(crate) use super::scan_faults::scan_fault;
 use super::sweep::{note_impossible_times, sweep_motion};
 use super::{Moment, SensorReader, SensorType};
 use crate::msgs::{CdrError, LaserScan, decode};
-use crate::tally::Tally;
-use crate::topics::is_unusual;
+use crate::tally::{Tally, is_unusual};
 use crate::walk::Message;
 
 /// Entry of laser scanners.

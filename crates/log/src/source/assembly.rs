@@ -12,8 +12,8 @@ use super::plan::Plan;
 use super::{LogFacts, LogFrame};
 use crate::camera_info::CalibrationError;
 use crate::scan::Type;
-use crate::tally::Tally;
-use crate::topics::{is_unusual, slower_words, unpaired};
+use crate::tally::{Tally, is_unusual};
+use crate::topics::{slower_words, unpaired};
 use crate::walk::{Channel, Message};
 
 /// Sequence of messages.

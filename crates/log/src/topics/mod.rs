@@ -38,7 +38,7 @@ use rigs::{Pick, Rig, may_be_one, rigs};
 use tagalong_config::nearest;
 use tagalong_core::{Input, Inputs, Usage};
 pub(crate) use units::told_unit;
-pub(crate) use unpaired::{is_unusual, slower_words, unpaired};
+pub(crate) use unpaired::{slower_words, unpaired};
 
 use crate::obstacles::ObstacleTopic;
 use crate::scan::{Scan, Topic};

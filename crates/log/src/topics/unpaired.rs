@@ -8,12 +8,9 @@ use super::problems::{
     wider_tolerance,
 };
 use crate::scan::{Scan, Topic};
+use crate::tally::is_unusual;
 use crate::timing::{Skew, Timing, nearest};
 
-/// Number and fraction of the frames without a partner that are normal: cameras skip an image from
-/// time to time.
-const USUAL_COUNT: u64 = 3;
-const USUAL_SHARE: f64 = 0.1;
 /// Ratio of the periods of two topics from which on one counts as slower.
 const SLOWER: f64 = 1.5;
 /// Minimum step of a topic that is slower by itself, in periods.
@@ -26,11 +23,6 @@ const MOST_PAIRED: f64 = 0.9;
 const RECORDED_PART: f64 = 0.5;
 /// Time between a frame and its partner in the log from which on it is too long to wait, s.
 const LONG_S: f64 = 1.0;
-
-/// Returns true if more frames have no partner than cameras normally skip.
-pub(crate) fn is_unusual(without: u64, frames: u64) -> bool {
-    without > USUAL_COUNT && without as f64 > USUAL_SHARE * frames as f64
-}
 
 /// Returns the reason why many frames of a topic have no image of a second one; `None` if that one
 /// is slower by itself, so that nothing is lost.
