@@ -253,7 +253,7 @@ mod tests {
         out.clear();
         too_slow_here(&mut out, &diagnosis);
         assert!(out.ends_with("live, the others are skipped\n"), "{out}");
-        // What does not fit is no row of the table of those that do.
+        // A network that does not fit is not listed among the pipelines that do.
         let printed = text(&diagnosis);
         assert!(printed.contains("\n  no network is among them: install one\n"), "{printed}");
     }

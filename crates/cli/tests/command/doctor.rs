@@ -334,18 +334,7 @@ fn real_logs_are_registered_and_moved_ones_are_not() {
 
 /// Simulates a scene, without the topics whose names have a part.
 fn simulated(home: &Path, scene: &str, without: &'static [&'static str]) -> PathBuf {
-    let [text, whole, log] = ["scene.toml", "whole.mcap", "scene.mcap"].map(|name| home.join(name));
-    std::fs::write(&text, scene).unwrap();
-    let drawn =
-        tagalong().arg("simulate").arg(&text).arg("-o").arg(&whole).arg("--overwrite").output();
-    let drawn = drawn.unwrap();
-    assert_eq!(code(&drawn), 0, "{}", text_of(&drawn));
-    broken::write(&whole, &log, &Changes { without, ..Changes::default() });
-    log
-}
-
-fn text_of(output: &std::process::Output) -> String {
-    text(&output.stderr)
+    broken::simulated(home, scene, &Changes { without, ..Changes::default() })
 }
 
 /// A coat stand nearby, and a person walking past behind it.

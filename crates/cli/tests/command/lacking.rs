@@ -2,7 +2,6 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Output;
 
 use serde_json::Value;
 
@@ -26,24 +25,15 @@ path = [[4.0, 4.4], [4.0, 1.5]]
 speed_mps = 0.6
 ";
 
-/// Simulates the scene, and runs over it with those scans alone that `changes` keeps.
-fn run(folder: &Path, changes: &Changes) -> Output {
-    fs::write(folder.join("scene.toml"), SCENE).unwrap();
-    let mut simulate = tagalong();
-    simulate.current_dir(folder).args(["simulate", "scene.toml", "-o", "whole.mcap"]);
-    messages_of(&simulate.output().unwrap(), 0);
-    broken::write(&folder.join("whole.mcap"), &folder.join("log.mcap"), changes);
-    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/depth-laser.toml");
-    let mut run = tagalong();
-    run.current_dir(folder).arg("run").arg(config).args(["log.mcap", "-o", "out"]);
-    run.output().unwrap()
-}
-
 #[test]
 fn frames_without_a_required_input_are_left_out_and_counted() {
     let folder = tempfile::tempdir().unwrap();
     let changes = Changes { thinned: Some(("scan", 10)), ..Changes::default() };
-    let told = messages_of(&run(folder.path(), &changes), 0);
+    let log = broken::simulated(folder.path(), SCENE, &changes);
+    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/depth-laser.toml");
+    let mut run = tagalong();
+    run.current_dir(folder.path()).arg("run").arg(config).arg(log).args(["-o", "out"]);
+    let told = messages_of(&run.output().unwrap(), 0);
     let report = fs::read(folder.path().join("out/report.json")).unwrap();
     let report: Value = serde_json::from_slice(&report).unwrap();
     let frames = &report["frames"];

@@ -3,12 +3,14 @@
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::BufWriter;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use mcap::records::MessageHeader;
 use mcap::{MessageStream, WriteOptions, Writer};
 use tagalong_core::Stamp;
 use tagalong_log::msgs::{CameraInfo, CompressedImage, Header, Image, TFMessage, decode, encode};
+
+use super::{code, tagalong, text};
 
 /// A depth reading by column and row, from the readings of the log and their width.
 pub type Readings = Box<dyn Fn(&[u16], usize, i64, i64) -> u16>;
@@ -34,6 +36,24 @@ pub struct Changes {
     pub thinned: Option<(&'static str, u64)>,
     /// Seconds of the log that are kept, from its first message on.
     pub first_s: Option<f64>,
+}
+
+/// Simulates a scene in a folder, and returns the log `scene.mcap` there, with the changes.
+pub fn simulated(home: &Path, scene: &str, changes: &Changes) -> PathBuf {
+    let [text_path, whole, log] =
+        ["scene.toml", "whole.mcap", "scene.mcap"].map(|name| home.join(name));
+    fs::write(&text_path, scene).unwrap();
+    let drawn = tagalong()
+        .arg("simulate")
+        .arg(&text_path)
+        .arg("-o")
+        .arg(&whole)
+        .arg("--overwrite")
+        .output();
+    let drawn = drawn.unwrap();
+    assert_eq!(code(&drawn), 0, "{}", text(&drawn.stderr));
+    write(&whole, &log, changes);
+    log
 }
 
 /// Writes the log `from` with the changes to `to`.
