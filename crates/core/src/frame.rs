@@ -249,6 +249,12 @@ impl Frame {
         Self { grey: self.grey.clone(), ..frame }
     }
 
+    /// Returns the same moment with other images of the frame's camera; a kind that `images` lacks stays.
+    /// Derived data are not copied.
+    pub fn with_images(&self, images: Images) -> Self {
+        self.of_same_moment(images.add_to(self.sensors.clone(), &self.camera))
+    }
+
     /// Returns the same moment, seen by another camera. The data of the sensors are shared; derived
     /// data are not copied.
     pub fn with_camera(&self, camera: Arc<Camera>) -> Self {

@@ -66,6 +66,7 @@
 //! | entry | dropped |
 //! |---|---|
 //! | `frame: duplicate`, `frame: out of order` | a frame, by its stamp |
+//! | `frame: wrong pixels` | single wrong pixels of the frame's images, before people are looked for; the controller sees the images as they came |
 //! | `frame: calibration changed` | a frame of another calibration, and each after it; tracks stay where they were |
 //! | `odometry: ...` | a frame that shows too little to correct the wheel odometry |
 //! | `stereo: ...`, `stereo pixels: ...` | a stereo pair, or pixels of it, without depth |

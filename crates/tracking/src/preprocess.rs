@@ -1,7 +1,10 @@
-use crate::{Guarded, StepError};
+use std::sync::Arc;
+
 use tagalong_core::{EgoMotion, Estimate, Frame, Funnel, Input, Inputs};
+use tagalong_vision::Cleaned;
 
 use crate::stage::StageLog;
+use crate::{Guarded, StepError};
 
 /// Output of a preprocessor.
 #[derive(Default)]
@@ -59,4 +62,12 @@ pub(crate) fn preprocess(
         completed = output.frame.or(completed);
     }
     Ok((completed, motion))
+}
+
+/// Returns the frame without wrong pixels, if its images have many.
+pub(crate) fn cleaned(frame: &Frame, log: &mut StageLog) -> Result<Arc<Cleaned>, StepError> {
+    let cleaned = frame.derived::<Cleaned>();
+    let cleaned = cleaned.map_err(|error| StepError::of_stage("[preprocess]", frame, error))?;
+    log.funnel.drop_many("frame: wrong pixels", u64::from(cleaned.frame().is_some()));
+    Ok(cleaned)
 }

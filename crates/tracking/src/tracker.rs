@@ -20,7 +20,7 @@ use crate::needs::Needs;
 use crate::occlusion::{
     Occluder, Visibility, occluder_of_detection, occluder_of_estimate, visibility,
 };
-use crate::preprocess::preprocess;
+use crate::preprocess::{cleaned, preprocess};
 use crate::reidentification::Reidentifier;
 use crate::search::SearchStage;
 use crate::silhouette::move_boxes;
@@ -145,7 +145,9 @@ impl Tracker {
             return Ok(self.hold(frame, motion, TrackingReport { outcome, ..report }, log));
         }
         let (completed, motion) = self.preprocess(frame, motion, &mut log)?;
-        let frame = log.timed(STAGES[0], completed.as_ref().unwrap_or(frame));
+        let frame = completed.as_ref().unwrap_or(frame);
+        let cleaned = cleaned(frame, &mut log)?;
+        let frame = log.timed(STAGES[0], cleaned.frame().unwrap_or(frame));
         self.reset_after(outcome, frame, &mut log)?;
         let predicted = self.predict(frame, motion, &mut log)?;
         let predicted = log.timed(STAGES[1], predicted);

@@ -7,9 +7,10 @@ use std::sync::{Arc, Mutex};
 use nalgebra::{Matrix3, Point3, SMatrix, Vector2};
 use tagalong_associators::hungarian::Hungarian;
 use tagalong_core::{
-    Association, Associations, Associator, Capabilities, Detection, Detector, EgoMotion, Estimate,
-    Evidence, Filter, FilterRequirements, Frame, Funnel, Gate, Images, Input, Inputs, Likelihood,
-    PerPerson, Person, Query, Result, Stamp, Track, TrackId, Update, Verifier, Visualisation,
+    Association, Associations, Associator, Capabilities, DepthImage, Detection, Detector,
+    EgoMotion, Estimate, Evidence, Filter, FilterRequirements, Frame, Funnel, Gate, Images, Input,
+    Inputs, Likelihood, PerPerson, Person, Query, Result, Stamp, Track, TrackId, Update, Verifier,
+    Visualisation,
 };
 use tagalong_filters::last_seen::LastSeen;
 use tagalong_geometry::{Camera, Pinhole};
@@ -386,6 +387,31 @@ fn the_log_odds_of_verifiers_add_up_and_none_is_certain() {
     assert_eq!([score(&[1e6], true), score(&[-1e6], true)], [100.0, -100.0]);
     let odd = verified(&[f64::NAN], true);
     assert_eq!((odd.candidates.len(), odd.funnel.count("verifier not finite")), (0, 1));
+}
+
+/// Log-odds are the least depth of the image, m.
+struct LeastDepth;
+
+impl Verifier for LeastDepth {
+    fn inputs(&self) -> Inputs {
+        Inputs::NONE
+    }
+
+    fn log_odds(&mut self, frame: &Frame, _: &Detection) -> Result<f64> {
+        Ok(frame.depth()?.pixels().iter().fold(9.0, |least, m| least.min(f64::from(*m))))
+    }
+}
+
+#[test]
+fn plugins_see_no_wrong_pixels_and_the_controller_does() {
+    let depth = DepthImage::from_fn(98, 98, |x, y| if x % 9 + y % 9 == 16 { 0.5 } else { 2.0 });
+    let noisy = frame(1).with_depth(Arc::new(depth));
+    let mut parts = parts();
+    parts.detectors = vec![Script::of([person(3.0, 0.0)]).slot(&[Role::Discover])];
+    parts.verifiers.push(Guarded::new("depth", Box::new(LeastDepth)));
+    let seen = Tracker::new(parts, TrackerSettings::default()).step(&noisy).unwrap();
+    assert_eq!(seen.report.tracks[0].score, 3.0, "1 of the detector, and 2 m");
+    assert!(seen.report.funnel.count("frame: wrong pixels") == 1 && seen.completed.is_none());
 }
 
 /// Returns these pairs.

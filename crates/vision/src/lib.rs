@@ -18,6 +18,7 @@ mod row_sums;
 mod sketch;
 mod speckle;
 mod upright;
+mod wrong_pixels;
 
 pub use appearance::{Appearance, AppearanceDifference};
 pub use boxes::{BoxSettings, BoxedBody, is_shown, log_odds_of};
@@ -29,3 +30,4 @@ pub use panorama::{Blend, Unwrapper, Unwrapping};
 pub use row_sums::{RowSums, Sums};
 pub use sketch::{ComparedPixels, Silhouette, Sketch, SketchMap, SketchPoint};
 pub use upright::{Upright, UprightGrey};
+pub use wrong_pixels::Cleaned;
