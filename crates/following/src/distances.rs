@@ -1,3 +1,5 @@
+//! Distances that `tagalong check` prints for a robot: stopping, separation from people, turning.
+
 use std::fmt;
 
 use nalgebra::Point2;
