@@ -1,3 +1,5 @@
+//! Suggestions in errors for names that do not exist: keys of a config, files, networks.
+
 use std::fs;
 use std::path::{Path, PathBuf};
 

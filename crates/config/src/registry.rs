@@ -1,3 +1,5 @@
+//! Registry of plugins by kind and name, and their construction from a config.
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::io::ErrorKind;

@@ -1,3 +1,5 @@
+//! Settings from TOML: parsing, ranges, and the place of an error in the file.
+
 use std::fmt::{self, Write as _};
 use std::ops;
 

@@ -1,3 +1,5 @@
+//! Commands for the wheels, with the reason of each and its text, and the trait of controllers.
+
 use std::fmt;
 
 use crate::{DiffDrive, Frame, Inputs, Stamp, Track, Twist, WheelSpeeds};

@@ -1,3 +1,5 @@
+//! CLEAR MOT: matches in each frame, false positives, misses and ID switches.
+
 use serde::{Deserialize, Serialize};
 
 use crate::prepare::{Prepared, PreparedFrame};

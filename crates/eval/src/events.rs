@@ -1,3 +1,5 @@
+//! Events of a sequence that a report lists: losses, ID switches, false tracks.
+
 use serde::{Deserialize, Serialize};
 
 use crate::clear::Match;

@@ -1,3 +1,9 @@
+//! HOTA, with its detection and association accuracy at nineteen similarity thresholds.
+//!
+//! Pairs compete by similarity times the alignment of their whole tracks. If several matchings have
+//! the same sum, [`Matcher`] chooses one by the order of the pairs: that of the truths and then of
+//! the tracks in the frame. A similarity that equals a threshold reaches it.
+
 use serde::{Deserialize, Serialize};
 
 use crate::pairs::PairTable;

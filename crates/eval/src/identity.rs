@@ -1,3 +1,5 @@
+//! IDF1 and its counts: one track for each person over the whole sequence.
+
 use serde::{Deserialize, Serialize};
 
 use crate::clear::MATCH_SIMILARITY;

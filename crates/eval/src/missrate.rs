@@ -1,3 +1,5 @@
+//! Log-average miss rate and average precision of detections by their scores.
+
 use serde::{Deserialize, Serialize};
 
 use crate::ratio;

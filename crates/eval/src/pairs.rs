@@ -1,3 +1,5 @@
+//! Numbers of the pairs of a person and a track that the metrics count.
+
 use crate::prepare::Prepared;
 use tagalong_math::matching::Edge;
 

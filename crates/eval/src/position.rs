@@ -1,3 +1,5 @@
+//! Errors of positions in metres.
+
 use serde::{Deserialize, Serialize};
 use tagalong_math::{mean, percentile};
 

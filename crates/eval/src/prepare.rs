@@ -1,3 +1,5 @@
+//! Sequences as the metrics compare them: without ignored people, with similarities.
+
 use crate::error::EvalError;
 use crate::types::{Frame, Report, Role, Sequence, Similarity, Truth};
 use tagalong_math::matching::{Edge, Matcher};

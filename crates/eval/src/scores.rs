@@ -1,3 +1,5 @@
+//! The figures of `eval` and `bench`, from counts that can be added over sequences.
+
 use serde::{Deserialize, Serialize};
 
 use crate::clear::Clear;

@@ -1,3 +1,5 @@
+//! OSPA and GOSPA: distances between the set of people and that of reports in a frame.
+
 use serde::{Deserialize, Serialize};
 
 use crate::prepare::{Prepared, PreparedFrame};

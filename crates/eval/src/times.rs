@@ -1,3 +1,5 @@
+//! Times until a person is confirmed or found again, and with the wrong person.
+
 use serde::{Deserialize, Serialize};
 
 use crate::clear::Match;

@@ -1,3 +1,5 @@
+//! Sequences of frames with people and reports, the input of all metrics.
+
 use serde::{Deserialize, Serialize};
 
 /// An upright rectangle in an image, in pixels; `x`, `y` is the upper left corner.

@@ -1,3 +1,5 @@
+//! Distances that `tagalong check` prints for a robot: stopping, separation from people, turning.
+
 use std::fmt;
 
 use nalgebra::Point2;
@@ -17,8 +19,8 @@ pub struct SafetyDistances {
     /// Distance of a thing ahead from the footprint at which a robot at full speed begins to brake, m.
     pub before_things_m: f64,
     /// Distance from the footprint to an approaching person at full speed, for a robot at full
-    /// speed (ISO 13855: S = (v_h + v_r) t + v_h v_r / a + v_r² / 2a + C, and v_h `settle_s` until the
-    /// wheels stand), m.
+    /// speed, m: after ISO 13855, the stopping distance + v_h (t + v / a + `settle_s`) + C, for a person
+    /// at speed v_h and a robot at speed v that reacts after t and brakes with a.
     pub separation_m: f64,
     /// The same for a robot that has nearly stopped: nearer it stands, m.
     pub least_separation_m: f64,

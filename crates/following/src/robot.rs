@@ -1,3 +1,5 @@
+//! Settings of the robot: footprint, speed limit, kind of base.
+
 use nalgebra::Point2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

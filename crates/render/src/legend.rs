@@ -1,3 +1,5 @@
+//! Strip below a picture: time, number of people and state of the robot, legend, dropped candidates.
+
 use nalgebra::Point2;
 use tagalong_geometry::Rect;
 use tagalong_pipeline::{FrameReport, Outcome};

@@ -1,3 +1,5 @@
+//! Colours and amount of detail of pictures.
+
 use tagalong_core::{Track, TrackId};
 use tagalong_geometry::Rect;
 use tagalong_log::write::{BoxedPart, track_colour};

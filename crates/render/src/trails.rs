@@ -1,3 +1,5 @@
+//! Trails in pictures. Their length is that of [`tagalong_log::write::Trails`].
+
 use nalgebra::Point3;
 use tagalong_core::{Stamp, TrackId};
 use tagalong_log::write;

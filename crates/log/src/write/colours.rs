@@ -1,3 +1,6 @@
+//! Colours of tracks in pictures and in `tracks.mcap`. Pages have the same ones as `--t0` to `--t19`
+//! in `crates/report/src/page/base.css`.
+
 use tagalong_core::TrackId;
 
 /// Colours of tracks: consecutive IDs are far apart in hue. All are of medium lightness, so that

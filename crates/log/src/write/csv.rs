@@ -1,3 +1,5 @@
+//! Columns of `tracks.csv`, `tracks-metres.csv` and `joints.csv`.
+
 use std::io::{self, Write};
 
 use nalgebra::Point3;

@@ -1,3 +1,5 @@
+//! Trails of people in pictures and in `tracks.mcap`: their positions in the last two seconds.
+
 use std::collections::{BTreeMap, VecDeque};
 
 use nalgebra::{Isometry2, Point3};
