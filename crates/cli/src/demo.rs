@@ -92,8 +92,8 @@ fn note_on(furniture: &[Furniture]) -> Option<String> {
     let names = names.join(" and ");
     (!names.is_empty()).then(|| {
         format!(
-            "{names} in the room look like people, but are not: the truth has no box there, and a \
-             track there is a false positive"
+            "like people, but none: {names} in the room. The truth has no box there, and a track \
+             there is a false positive"
         )
     })
 }

@@ -111,7 +111,7 @@ fn entries(scene: &OverlayData, style: OverlayStyle) -> Vec<(Sample, &'static st
             (Sample::Seen, "seen: ID, distance (~ guess)"),
             (Sample::Predicted, "predicted"),
             (Sample::Trail, "last 2 s"),
-            (Sample::Velocity, "place in 1 s"),
+            (Sample::Velocity, "position in 1 s"),
         ];
     }
     let sketch = scene.report.visualisation.as_ref().and_then(|shown| shown.downcast_ref());
@@ -123,7 +123,7 @@ fn entries(scene: &OverlayData, style: OverlayStyle) -> Vec<(Sample, &'static st
         (Sample::Dropped, "dropped, by test"),
         (Sample::Trail, "trail"),
     ];
-    let plan = [(Sample::Velocity, "place in 1 s"), (Sample::Ellipse, "2 sigma")];
+    let plan = [(Sample::Velocity, "position in 1 s"), (Sample::Ellipse, "2 sigma")];
     let particles = has_particles.then_some((Sample::Particles, "particles"));
     image.into_iter().chain(particles).chain(plan).collect()
 }

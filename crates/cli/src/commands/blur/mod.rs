@@ -139,8 +139,8 @@ struct Copying<'a> {
 struct Counts {
     /// Images with at least one head.
     blurred: u64,
-    /// Heads in them.
-    heads: u64,
+    /// Areas in them: a head has several, of the frames before and after.
+    areas: u64,
     /// Images of these topics.
     images: u64,
     /// Images that could not be decoded, which the copy lacks.
@@ -256,7 +256,7 @@ impl Copying<'_> {
             return None;
         }
         let heads = self.heads.at(stamp_ns, aside);
-        self.counts.heads += heads.len() as u64;
+        self.counts.areas += heads.len() as u64;
         self.counts.blurred += u64::from(!heads.is_empty());
         for head in &heads {
             match &mut pixels {
@@ -272,10 +272,14 @@ impl Copying<'_> {
 impl Counts {
     /// Returns the numbers, and the warning that a user needs before sharing the copy.
     fn summary(&self, copy: &Path) -> String {
-        let Self { images, blurred, heads, .. } = self;
-        let heads = counted(*heads, "head");
+        let Self { images, blurred, areas, .. } = self;
+        let areas = counted(*areas, "area");
         let images = counted(*images, "image");
-        let mut text = format!("{}: {heads} blurred, in {blurred} of {images}\n", copy.display());
+        let mut text = format!(
+            "{}: heads blurred in {blurred} of {images}, as {areas} around each head and its places \
+             shortly before and after\n",
+            copy.display()
+        );
         for (topic, (count, reason)) in &self.left_out {
             let _ = writeln!(text, "left out: {} of {topic}: {reason}", counted(*count, "message"));
         }
