@@ -240,11 +240,10 @@ impl Witness {
     ) -> Option<MeasuredValue> {
         let mut value = self.measured(number, dropped)?.clone();
         if OF_SCORE.contains(&test) {
-            value.limits.extend(least_score(rules.config));
+            value.limits = least_scores(value.value, rules.config);
         }
-        let (_, limit) = value.limits.first()?;
-        // A verifier may change the score after the manager has judged it.
-        (!OF_SCORE.contains(&test) || value.value < *limit).then_some(value)
+        // A verifier may change the score after the manager has judged it: it is below no limit then.
+        (!value.limits.is_empty()).then_some(value)
     }
 
     /// Returns the candidate that came closest to a track. One of the person's size has priority
@@ -280,13 +279,19 @@ fn beyond(value: &MeasuredValue) -> f64 {
     value.limits.first().map_or(f64::INFINITY, |(_, limit)| (value.value - limit).abs())
 }
 
-/// Returns the minimum score of a candidate that starts a track, with the name of its setting.
-fn least_score(config: &Table) -> Option<(String, f64)> {
-    let manager = sections(config).find(|section| section.name == "manager")?;
-    ["start_log_odds", "start_score"].into_iter().find_map(|key| {
-        let limit = manager.setting(key).and_then(number)?;
-        Some((key.to_owned(), limit))
-    })
+/// Returns the minimum score of a candidate that starts a track, with the name of its setting. If the
+/// score is also below the one at which the manager ends tracks, that limit follows: the manager
+/// refuses a config in which it is not the lower one.
+fn least_scores(score: f64, config: &Table) -> Vec<(String, f64)> {
+    let mut limits = Vec::new();
+    let Some(manager) = sections(config).find(|section| section.name == "manager") else {
+        return limits;
+    };
+    for key in ["start_log_odds", "start_score", "end_log_odds", "drop_score"] {
+        let limit = manager.setting(key).and_then(number);
+        limits.extend(limit.filter(|limit| score < *limit).map(|limit| (key.to_owned(), limit)));
+    }
+    limits
 }
 
 impl Cause {

@@ -124,6 +124,17 @@ fn a_score_is_told_against_the_least_one_that_starts_a_track() {
             && told.contains("{ start_log_odds = -1.31 }"),
         "{told}"
     );
+    // The manager wants an end below the start.
+    let manager = config.get_mut("manager").and_then(|manager| manager.get_mut("config"));
+    let manager = manager.and_then(toml::Value::as_table_mut).expect("a manager");
+    manager.insert("end_log_odds".to_owned(), (-1.0).into());
+    let rules = Rules { remedies: &remedies(), config: &config };
+    let told = witness.cause_at(1, &place, rules).text;
+    assert!(
+        told.contains("< start_log_odds 0 and < end_log_odds -1; it passes with [manager]")
+            && told.contains("{ start_log_odds = -1.31, end_log_odds = -1.32 }"),
+        "{told}"
+    );
 }
 
 #[test]
