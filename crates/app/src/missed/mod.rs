@@ -195,7 +195,8 @@ impl Witness {
             }
             (None, None) => "No track began here".to_owned(),
         };
-        let text = format!("{lead}: {why}.");
+        let end = if why.ends_with('?') { "" } else { "." };
+        let text = format!("{lead}: {why}{end}");
         Cause { text, ..cause }
     }
 

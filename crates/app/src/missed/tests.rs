@@ -138,6 +138,12 @@ fn a_score_is_told_against_the_least_one_that_starts_a_track() {
 }
 
 #[test]
+fn advice_that_is_a_question_ends_in_its_mark() {
+    let told = of_drops(&[("head width", AT)]).text;
+    assert!(told.ends_with("is the depth scaled right?"), "{told}");
+}
+
+#[test]
 fn a_candidate_that_overlaps_the_person_is_better_than_none() {
     // On the chest: its centre is below the person's square.
     let chest = [110.0, 152.0, 50.0, 50.0];
