@@ -17,7 +17,7 @@ use toml::Table;
 use crate::frame_notes::MeasuredValue;
 use crate::remedies::{Remedies, number, sections};
 
-use witness::{DroppedPlace, OF_SCORE};
+use witness::{DroppedPlace, EndedTrack, OF_SCORE};
 
 pub use depths::Depths;
 pub use witness::{SightedTrack, TrackStage, Witness};
@@ -181,6 +181,11 @@ impl Witness {
                 return Cause::of_unconfirmed(id, rules);
             }
         }
+        if here.is_none()
+            && let Some(ended) = self.ended_at(number, place)
+        {
+            return Cause::of_ended(ended, rules);
+        }
         let (cause, why) = self.dropped_or_measured(number, place, taken, rules);
         let lead = match (here, former) {
             (Some(track), _) => format!(
@@ -296,6 +301,23 @@ fn least_scores(score: f64, config: &Table) -> Vec<(String, f64)> {
 }
 
 impl Cause {
+    fn of_ended(ended: &EndedTrack, rules: Rules<'_>) -> Self {
+        let id = ended.id;
+        let (name, why) = match &ended.test {
+            Some(test) => {
+                let decided = rules.remedies.decided(test, rules.config);
+                (test.as_str(), format!("the test \"{test}\" ended the track{decided}"))
+            }
+            None => ("track: ended", "the track manager ended the track".to_owned()),
+        };
+        Self {
+            name: name.to_owned(),
+            text: format!("Track {id} was seen here and ended in this frame: {why}."),
+            why,
+            ..Self::default()
+        }
+    }
+
     fn of_unconfirmed(id: u32, rules: Rules<'_>) -> Self {
         let decided = rules.remedies.decided(NOT_CONFIRMED, rules.config);
         let why = format!("the track manager has not confirmed the track yet{decided}");

@@ -204,6 +204,30 @@ fn tracks_that_are_seen_or_not_confirmed_are_causes_of_their_own() {
 }
 
 #[test]
+fn a_track_that_ends_in_the_frame_is_the_cause_and_not_a_candidate_beside_it() {
+    let ended = CandidateNote { fate: FateNote::Matched(5), ..candidate("", AT) };
+    let of_track = DroppedNote { boxes_px: Vec::new(), ..dropped("track: not confirmed", AT) };
+    let notes = FrameNotes {
+        candidates: vec![ended],
+        dropped: vec![dropped("occupied", AT), of_track],
+        ended: vec![5],
+        ..FrameNotes::default()
+    };
+    let found = cause(&notes, &[], None);
+    assert_eq!((found.name.as_str(), found.test), (NOT_CONFIRMED, None));
+    assert!(
+        found.text.starts_with(
+            "Track 5 was seen here and ended in this frame: the test \"track: not confirmed\" ended \
+             the track; decided by [manager]"
+        ),
+        "{}",
+        found.text
+    );
+    let two = FrameNotes { ended: Vec::new(), ..notes };
+    assert_eq!(cause(&two, &[], None).name, "occupied", "that track goes on");
+}
+
+#[test]
 fn a_second_detection_of_another_person_is_not_that_of_the_missed_one() {
     let between = [119.0, 101.0, 58.0, 58.0];
     let notes = FrameNotes { dropped: vec![dropped("occupied", between)], ..FrameNotes::default() };
