@@ -511,6 +511,19 @@ fn a_missed_person_has_the_sentence_of_the_frame_and_other_causes_have_names() {
 }
 
 #[test]
+fn settings_of_a_cause_are_of_a_named_pipeline_if_another_one_has_others() {
+    let mut benchmark = two_by_three();
+    let same = html(&benchmark, None);
+    assert!(same.contains("<span class=\"why\">the test &quot;margin&quot;"), "no name");
+    for task in &mut benchmark.tasks {
+        task.reasons.insert("margin".to_owned(), format!("a setting of {}", task.pipeline));
+    }
+    let page = html(&benchmark, None);
+    let named = ["alpha", "beta"].map(|p| format!("<span class=\"why\">{p}: a setting of {p}<"));
+    assert!(named.iter().any(|text| page.contains(text)), "one of them");
+}
+
+#[test]
 fn all_that_are_equal_when_printed_are_best() {
     fn task(pipeline: &str, hota: f64) -> TaskResult {
         let image =

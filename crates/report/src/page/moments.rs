@@ -124,8 +124,11 @@ impl Page<'_> {
 
     fn deciding_anywhere(&self, test: &str) -> Markup {
         let tasks = self.view.pipelines.iter().flat_map(|p| self.view.done(p));
-        let why = tasks.filter_map(|task| task.reasons.get(test)).next();
-        html! { @if let Some(why) = why { span class="why" { (why) } } }
+        let mut told = tasks.filter_map(|task| Some((&task.pipeline, task.reasons.get(test)?)));
+        let Some((pipeline, why)) = told.next() else { return html! {} };
+        // The counts of a row are those of pipelines with other settings, too.
+        let is_of_all = told.all(|(_, other)| other == why);
+        html! { span class="why" { @if !is_of_all { (pipeline) ": " } (why) } }
     }
 
     fn moment(&self, moment: &Moment) -> Markup {
