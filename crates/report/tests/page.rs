@@ -524,6 +524,16 @@ fn settings_of_a_cause_are_of_a_named_pipeline_if_another_one_has_others() {
 }
 
 #[test]
+fn a_narrow_column_breaks_the_path_of_a_setting_at_its_dots() {
+    let mut benchmark = two_by_three();
+    for task in &mut benchmark.tasks {
+        task.causes = vec!["It passes with detectors.0.config.cost = 0.38.".to_owned(); 2];
+    }
+    let page = html(&benchmark, None);
+    assert!(page.contains("with detectors.0.<wbr>config.<wbr>cost = 0.38.</span>"));
+}
+
+#[test]
 fn all_that_are_equal_when_printed_are_best() {
     fn task(pipeline: &str, hota: f64) -> TaskResult {
         let image =
