@@ -160,7 +160,7 @@ const checkBehind = async (page) => {
 const checkReview = async (page) => {
   const frame = await frameNow(page);
   const open = () => readRows().filter((row) => row.frame === frame && row.proposed).length;
-  assert.ok(open() > 0 && (await page.textContent("#open")).includes("Nobody reviewed"), "the boxes are proposed");
+  assert.ok(open() > 0 && (await page.textContent("#open")).includes("Not reviewed yet"), "the boxes are proposed");
   await press(page, "r");
   assert.equal(open(), 0, "they are reviewed");
   assert.notEqual(await frameNow(page), frame, "the next frame is shown");

@@ -11,6 +11,8 @@ const pictures = process.env.TAGALONG_PICTURES;
 const name = process.env.TAGALONG_PAGE || "report";
 // Height of the folded page by screen, px.
 const MOST_PX = { desk: 6000, wide: 6000, phone: 15000 };
+// A landscape sheet of A4 without its margins, px.
+const SHEET = { width: 1032, height: 703 };
 // Rows of a table that axe sees: the others are of the same kind, and axe takes minutes for thousands.
 const MOST_ROWS = 6;
 
@@ -24,6 +26,10 @@ const look = async (browser, { way, colorScheme, viewport, javaScript = true, me
   if (most) {
     const height = await page.evaluate(() => document.documentElement.scrollHeight);
     if (height >= most) problems.push(`the page is ${height} px high, and should be below ${most}`);
+  }
+  if (media === "print") {
+    const over = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+    if (over > 0) problems.push(`the printed page is ${over} px too wide`);
   }
   if (pictures && javaScript) await photograph(page, way);
   if (javaScript) problems.push(...(await judge(page, media)));
@@ -56,7 +62,7 @@ const main = async () => {
   const desk = WAYS[0].viewport;
   const ways = [
     ...WAYS,
-    { way: "print", colorScheme: "dark", viewport: desk, media: "print" },
+    { way: "print", colorScheme: "dark", viewport: SHEET, media: "print" },
     { way: "no-script", colorScheme: "light", viewport: desk, javaScript: false },
   ];
   const problems = [];

@@ -100,6 +100,9 @@ pub struct DriveNote {
     pub movers_cm: Vec<i32>,
 }
 
+/// Decimals to which a measured value is rounded.
+const VALUE_DECIMALS: usize = 4;
+
 /// Side of the grid cells for positions of obstacles, cm.
 const CELL_CM: i32 = 10;
 
@@ -191,7 +194,22 @@ impl MeasuredValue {
                 format!("{sign} {setting} {limit}")
             })
             .collect();
-        format!("{} {:.2} {}", self.what, self.value, limits.join(" and "))
+        format!("{} {} {}", self.what, self.shown(), limits.join(" and "))
+    }
+
+    /// Returns the value with two decimals, or with as many more as it takes to differ from its
+    /// limits; without decimals if it is a count.
+    fn shown(&self) -> String {
+        if is_whole(self.value) && self.limits.iter().all(|(_, limit)| is_whole(*limit)) {
+            return self.value.to_string();
+        }
+        for decimals in 2..VALUE_DECIMALS {
+            let text = format!("{:.decimals$}", self.value);
+            if self.limits.iter().all(|(_, limit)| format!("{limit:.decimals$}") != text) {
+                return text;
+            }
+        }
+        format!("{:.VALUE_DECIMALS$}", self.value)
     }
 
     /// Returns true if a limit must rise for the candidate to pass.
@@ -257,6 +275,10 @@ impl DriveNote {
             movers_cm: cells_cm(&report.obstacles, true, odom_from_robot),
         })
     }
+}
+
+fn is_whole(value: f64) -> bool {
+    value.fract() == 0.0
 }
 
 /// Returns the centres of the cells with moving or with fixed obstacles, each once.
@@ -375,6 +397,21 @@ mod tests {
         assert_eq!(notes.ended, [2]);
         assert_eq!(notes.doubts, [DoubtNote { id: 3, others: vec![4] }]);
         assert_eq!(notes.corrections, [CorrectionNote { since: 5, ids: [3, 4] }]);
+    }
+
+    #[test]
+    fn a_value_is_written_so_that_it_differs_from_its_limit() {
+        for (what, value, setting, limit, words) in [
+            ("cost", 0.4712, "refine_cost", 0.4, "cost 0.47 > refine_cost 0.4"),
+            ("cost", 0.3012, "discover_cost", 0.3, "cost 0.301 > discover_cost 0.3"),
+            ("width", 0.0898, "min_width_m", 0.09, "width 0.0898 < min_width_m 0.09"),
+            ("cells", 1.0, "min_cells", 2.0, "cells 1 < min_cells 2"),
+            ("body", 0.0, "min_body", 0.5, "body 0.00 < min_body 0.5"),
+        ] {
+            let limits = vec![(setting.to_owned(), limit)];
+            let told = MeasuredValue { what: what.to_owned(), value, limits };
+            assert_eq!(told.in_words(), words);
+        }
     }
 
     #[test]

@@ -14,6 +14,9 @@ const TABLE: &str = include_str!("remedies.toml");
 /// Maximum number of settings in a sentence, because a reader tries one or two.
 const MOST_SETTINGS: usize = 2;
 
+/// Largest rounding error of a noted value; a score has the largest.
+const ROUNDING: f64 = 0.0005;
+
 /// Remedy for the candidates that a test drops.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -147,7 +150,7 @@ impl Remedies {
             return format!("{}, {}", self.sentence(test, resolved), measured.in_words());
         };
         let mut passing: Vec<Setting> = Vec::new();
-        for (key, limit) in &measured.limits {
+        for (at, (key, limit)) in measured.limits.iter().enumerate() {
             let section = sections(resolved).find(|section| remedy.has_limit(section, key, *limit));
             let found = section.and_then(|section| {
                 let now = section.setting(key)?;
@@ -155,7 +158,7 @@ impl Remedies {
                     section: section.header(),
                     is_entry: section.at.is_some(),
                     plugin: section.plugin().map(ToOwned::to_owned),
-                    assignment: format!("{key} = {}", passing_value(measured, *limit, now)),
+                    assignment: format!("{key} = {}", passing_value(measured, at, now)),
                 })
             });
             passing.extend(found);
@@ -319,12 +322,21 @@ pub fn reach_m(resolved: &Table) -> Option<f64> {
     limits.reduce(f64::max)
 }
 
-/// Returns the value of a setting with which a candidate would pass, to a hundredth.
-fn passing_value(measured: &MeasuredValue, limit: f64, now: &Value) -> Value {
-    let parts = if now.is_integer() { 1.0 } else { 100.0 };
-    let below = (measured.value * parts).floor();
-    let passing = if measured.is_above(limit) { below + 1.0 } else { below } / parts;
-    if now.is_integer() { Value::from(passing as i64) } else { Value::from(passing) }
+/// Returns the value of the setting of a limit with which a candidate would pass, to a hundredth.
+/// Of several limits that the value is below, each is a hundredth lower than the one before it.
+fn passing_value(measured: &MeasuredValue, at: usize, now: &Value) -> Value {
+    let is_above = measured.is_above(measured.limits[at].1);
+    if now.is_integer() {
+        let passing = measured.value.floor() as i64;
+        return Value::from(if is_above { passing + 1 } else { passing });
+    }
+    if is_above {
+        return Value::from(((measured.value * 100.0).floor() + 1.0) / 100.0);
+    }
+    let below = ((measured.value - ROUNDING) * 100.0).floor() - at as f64;
+    // The limit of a share or of a width is not negative.
+    let least = if measured.value < 0.0 { f64::NEG_INFINITY } else { 0.0 };
+    Value::from(below.max(least) / 100.0)
 }
 
 /// Returns a value as a number, if it is one.

@@ -511,6 +511,29 @@ fn a_missed_person_has_the_sentence_of_the_frame_and_other_causes_have_names() {
 }
 
 #[test]
+fn settings_of_a_cause_are_of_a_named_pipeline_if_another_one_has_others() {
+    let mut benchmark = two_by_three();
+    let same = html(&benchmark, None);
+    assert!(same.contains("<span class=\"why\">the test &quot;margin&quot;"), "no name");
+    for task in &mut benchmark.tasks {
+        task.reasons.insert("margin".to_owned(), format!("a setting of {}", task.pipeline));
+    }
+    let page = html(&benchmark, None);
+    let named = ["alpha", "beta"].map(|p| format!("<span class=\"why\">{p}: a setting of {p}<"));
+    assert!(named.iter().any(|text| page.contains(text)), "one of them");
+}
+
+#[test]
+fn a_narrow_column_breaks_the_path_of_a_setting_at_its_dots() {
+    let mut benchmark = two_by_three();
+    for task in &mut benchmark.tasks {
+        task.causes = vec!["It passes with detectors.0.config.cost = 0.38.".to_owned(); 2];
+    }
+    let page = html(&benchmark, None);
+    assert!(page.contains("with detectors.0.<wbr>config.<wbr>cost = 0.38.</span>"));
+}
+
+#[test]
 fn all_that_are_equal_when_printed_are_best() {
     fn task(pipeline: &str, hota: f64) -> TaskResult {
         let image =

@@ -103,7 +103,9 @@ impl Drops {
         } else {
             let apart = APART_M * view.px_per_m(depth_m);
             let is_apart = entry.places.iter().all(|kept| kept.is_apart(x, y, apart));
-            if !is_apart || entry.places.len() == MOST_PLACES {
+            // Those that `keep_apart` forgets must not take the room of others.
+            let is_full = test != tests_named::REFINE && entry.places.len() == MOST_PLACES;
+            if !is_apart || is_full {
                 return;
             }
         }
@@ -111,13 +113,15 @@ impl Drops {
         entry.places.push(Place { x, y, depth_m, measured });
     }
 
-    /// Forgets the places of a test that are near one that passed: a person was found there.
+    /// Forgets the places of a test that are near one that passed: a person was found there. Of the
+    /// others, the first ones are kept.
     pub fn keep_apart(&mut self, test: &str, view: &MetricImage, passed: &[Cell]) {
         let Some(entry) = self.entries.iter_mut().find(|entry| entry.test == test) else { return };
         entry.places.retain(|place| {
             let apart = 2.0 * APART_M * view.px_per_m(place.depth_m);
             passed.iter().all(|cell| place.is_apart(cell.x, cell.y, apart))
         });
+        entry.places.truncate(MOST_PLACES);
     }
 
     /// Returns the kept places of a test.
@@ -138,5 +142,39 @@ impl Drops {
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use nalgebra::Point3;
+    use tagalong_core::DepthImage;
+    use tagalong_geometry::{Camera, Pinhole};
+    use tagalong_vision::RowSums;
+
+    use super::*;
+
+    #[test]
+    fn places_at_a_person_who_was_found_take_no_room_from_others() {
+        let camera = Camera::mounted(Pinhole::centred(60.0, 64, 48), 64, 48, 1.2, 0.0, 0.0);
+        let rows = RowSums::new(&DepthImage::filled(64, 48, 3.0), 1);
+        let view = MetricImage::new(&Arc::new(camera), &rows);
+        let depth_m = 3.0;
+        // Twenty pixels per metre: four are 0.2 m.
+        let found: Vec<i64> = (0..=MOST_PLACES as i64).map(|at| 4 * at).collect();
+        let mut drops = Drops::default();
+        let mut passed = Vec::new();
+        for x in &found {
+            drops.add(Failed::at(tests_named::REFINE), &view, (*x, 0), depth_m);
+            let head = Point3::new(3.0, 0.0, 1.6);
+            passed.push(Cell { x: *x, y: 2, depth_m, cost: 0.1, head });
+        }
+        drops.add(Failed::at(tests_named::REFINE), &view, (20, 40), depth_m);
+        drops.keep_apart(tests_named::REFINE, &view, &passed);
+        let kept: Vec<_> =
+            drops.places_of(tests_named::REFINE).iter().map(|p| (p.x, p.y)).collect();
+        assert_eq!(kept, [(20, 40)]);
     }
 }

@@ -104,7 +104,7 @@ const show = () => {
   byId("add").setAttribute("aria-pressed", String(adding));
   const open = unreviewed();
   byId("review").disabled = !here().some((id) => rowOf(id).proposed);
-  byId("open").textContent = open.boxes ? `Nobody reviewed ${open.boxes} proposed boxes in ${open.frames} frames.` : "";
+  byId("open").textContent = open.boxes ? `Not reviewed yet: ${open.boxes} proposed boxes in ${open.frames} frames.` : "";
   byId("saved").textContent = able.saved ? `All is saved in ${about.file}.` : `Not saved yet: ${about.file}`;
   showImage();
   showBoxes();

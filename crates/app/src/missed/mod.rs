@@ -17,7 +17,7 @@ use toml::Table;
 use crate::frame_notes::MeasuredValue;
 use crate::remedies::{Remedies, number, sections};
 
-use witness::{DroppedPlace, OF_SCORE};
+use witness::{DroppedPlace, EndedTrack, OF_SCORE};
 
 pub use depths::Depths;
 pub use witness::{SightedTrack, TrackStage, Witness};
@@ -181,6 +181,11 @@ impl Witness {
                 return Cause::of_unconfirmed(id, rules);
             }
         }
+        if here.is_none()
+            && let Some(ended) = self.ended_at(number, place)
+        {
+            return Cause::of_ended(ended, rules);
+        }
         let (cause, why) = self.dropped_or_measured(number, place, taken, rules);
         let lead = match (here, former) {
             (Some(track), _) => format!(
@@ -195,7 +200,8 @@ impl Witness {
             }
             (None, None) => "No track began here".to_owned(),
         };
-        let text = format!("{lead}: {why}.");
+        let end = if why.ends_with('?') { "" } else { "." };
+        let text = format!("{lead}: {why}{end}");
         Cause { text, ..cause }
     }
 
@@ -240,11 +246,10 @@ impl Witness {
     ) -> Option<MeasuredValue> {
         let mut value = self.measured(number, dropped)?.clone();
         if OF_SCORE.contains(&test) {
-            value.limits.extend(least_score(rules.config));
+            value.limits = least_scores(value.value, rules.config);
         }
-        let (_, limit) = value.limits.first()?;
-        // A verifier may change the score after the manager has judged it.
-        (!OF_SCORE.contains(&test) || value.value < *limit).then_some(value)
+        // A verifier may change the score after the manager has judged it: it is below no limit then.
+        (!value.limits.is_empty()).then_some(value)
     }
 
     /// Returns the candidate that came closest to a track. One of the person's size has priority
@@ -280,16 +285,39 @@ fn beyond(value: &MeasuredValue) -> f64 {
     value.limits.first().map_or(f64::INFINITY, |(_, limit)| (value.value - limit).abs())
 }
 
-/// Returns the minimum score of a candidate that starts a track, with the name of its setting.
-fn least_score(config: &Table) -> Option<(String, f64)> {
-    let manager = sections(config).find(|section| section.name == "manager")?;
-    ["start_log_odds", "start_score"].into_iter().find_map(|key| {
-        let limit = manager.setting(key).and_then(number)?;
-        Some((key.to_owned(), limit))
-    })
+/// Returns the minimum score of a candidate that starts a track, with the name of its setting. If the
+/// score is also below the one at which the manager ends tracks, that limit follows: the manager
+/// refuses a config in which it is not the lower one.
+fn least_scores(score: f64, config: &Table) -> Vec<(String, f64)> {
+    let mut limits = Vec::new();
+    let Some(manager) = sections(config).find(|section| section.name == "manager") else {
+        return limits;
+    };
+    for key in ["start_log_odds", "start_score", "end_log_odds", "drop_score"] {
+        let limit = manager.setting(key).and_then(number);
+        limits.extend(limit.filter(|limit| score < *limit).map(|limit| (key.to_owned(), limit)));
+    }
+    limits
 }
 
 impl Cause {
+    fn of_ended(ended: &EndedTrack, rules: Rules<'_>) -> Self {
+        let id = ended.id;
+        let (name, why) = match &ended.test {
+            Some(test) => {
+                let decided = rules.remedies.decided(test, rules.config);
+                (test.as_str(), format!("the test \"{test}\" ended the track{decided}"))
+            }
+            None => ("track: ended", "the track manager ended the track".to_owned()),
+        };
+        Self {
+            name: name.to_owned(),
+            text: format!("Track {id} was seen here and ended in this frame: {why}."),
+            why,
+            ..Self::default()
+        }
+    }
+
     fn of_unconfirmed(id: u32, rules: Rules<'_>) -> Self {
         let decided = rules.remedies.decided(NOT_CONFIRMED, rules.config);
         let why = format!("the track manager has not confirmed the track yet{decided}");

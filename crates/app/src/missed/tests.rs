@@ -124,6 +124,23 @@ fn a_score_is_told_against_the_least_one_that_starts_a_track() {
             && told.contains("{ start_log_odds = -1.31 }"),
         "{told}"
     );
+    // The manager wants an end below the start.
+    let manager = config.get_mut("manager").and_then(|manager| manager.get_mut("config"));
+    let manager = manager.and_then(toml::Value::as_table_mut).expect("a manager");
+    manager.insert("end_log_odds".to_owned(), (-1.0).into());
+    let rules = Rules { remedies: &remedies(), config: &config };
+    let told = witness.cause_at(1, &place, rules).text;
+    assert!(
+        told.contains("< start_log_odds 0 and < end_log_odds -1; it passes with [manager]")
+            && told.contains("{ start_log_odds = -1.31, end_log_odds = -1.32 }"),
+        "{told}"
+    );
+}
+
+#[test]
+fn advice_that_is_a_question_ends_in_its_mark() {
+    let told = of_drops(&[("head width", AT)]).text;
+    assert!(told.ends_with("is the depth scaled right?"), "{told}");
 }
 
 #[test]
@@ -184,6 +201,30 @@ fn tracks_that_are_seen_or_not_confirmed_are_causes_of_their_own() {
     assert_eq!(other.name, "body below", "track 8 is on another person");
     let stages = [(false, true), (true, true), (true, false)].map(|(c, s)| TrackStage::of(c, s));
     assert_eq!(stages, [TrackStage::Tentative, TrackStage::Seen, TrackStage::Predicted]);
+}
+
+#[test]
+fn a_track_that_ends_in_the_frame_is_the_cause_and_not_a_candidate_beside_it() {
+    let ended = CandidateNote { fate: FateNote::Matched(5), ..candidate("", AT) };
+    let of_track = DroppedNote { boxes_px: Vec::new(), ..dropped("track: not confirmed", AT) };
+    let notes = FrameNotes {
+        candidates: vec![ended],
+        dropped: vec![dropped("occupied", AT), of_track],
+        ended: vec![5],
+        ..FrameNotes::default()
+    };
+    let found = cause(&notes, &[], None);
+    assert_eq!((found.name.as_str(), found.test), (NOT_CONFIRMED, None));
+    assert!(
+        found.text.starts_with(
+            "Track 5 was seen here and ended in this frame: the test \"track: not confirmed\" ended \
+             the track; decided by [manager]"
+        ),
+        "{}",
+        found.text
+    );
+    let two = FrameNotes { ended: Vec::new(), ..notes };
+    assert_eq!(cause(&two, &[], None).name, "occupied", "that track goes on");
 }
 
 #[test]

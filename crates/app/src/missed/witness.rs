@@ -28,6 +28,12 @@ const NEAR_M: f64 = 0.75;
 /// Tests of the score of a candidate, whose limit is in the config of the track manager.
 pub(super) const OF_SCORE: [&str; 2] = ["score", "verifier"];
 
+/// Beginning of the names of the tests that end tracks.
+const OF_TRACKS: &str = "track: ";
+
+/// Name of the test of a place that no test dropped.
+const NO_TEST: &str = "";
+
 /// State of a track in one frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TrackStage {
@@ -78,10 +84,22 @@ pub(super) struct DroppedPlace {
     measured: Option<u16>,
 }
 
+/// Track that got a candidate in a frame and ended in it.
+#[derive(Clone, Debug)]
+pub(super) struct EndedTrack {
+    /// ID of the track.
+    pub(super) id: u32,
+    /// Test by which it ended, if only one test ended tracks in the frame.
+    pub(super) test: Option<String>,
+    /// Position of its candidate.
+    at: DroppedPlace,
+}
+
 /// One frame of a run.
 #[derive(Clone, Debug, Default)]
 struct Sight {
     places: Vec<DroppedPlace>,
+    ended: Vec<EndedTrack>,
     measured: Vec<MeasuredValue>,
     tracks: Vec<SightedTrack>,
     /// Pose of the robot in the odometry frame.
@@ -114,9 +132,17 @@ impl Witness {
     ) {
         let mut places = Vec::new();
         let mut measured = Vec::new();
+        let mut ended = Vec::new();
         for candidate in &notes.candidates {
+            let [x, y, _] = candidate.head_odom_m;
+            if let FateNote::Matched(id) | FateNote::Started(id) = candidate.fate
+                && notes.ended.contains(&id)
+            {
+                let test = end_test(notes);
+                let at = self.place(NO_TEST, candidate.box_px, [x, y]);
+                ended.push(EndedTrack { id, test, at });
+            }
             if let FateNote::Dropped(test) = &candidate.fate {
-                let [x, y, _] = candidate.head_odom_m;
                 let mut place = self.place(test, candidate.box_px, [x, y]);
                 if OF_SCORE.contains(&test.as_str()) {
                     place.measured = u16::try_from(measured.len()).ok();
@@ -142,7 +168,8 @@ impl Witness {
                 }
             }
         }
-        let sight = Sight { places, measured, tracks, robot_odom: notes.robot_odom, depths };
+        let robot_odom = notes.robot_odom;
+        let sight = Sight { places, ended, measured, tracks, robot_odom, depths };
         self.frames.insert(number, sight);
     }
 
@@ -206,6 +233,15 @@ impl Witness {
         })
     }
 
+    /// Returns the track that had a candidate of a person's size at a position and ended in the frame.
+    pub(super) fn ended_at(&self, number: u64, person: &PersonAt) -> Option<&EndedTrack> {
+        let mut ended = self.frames.get(&number)?.ended.iter();
+        ended.find(|track| {
+            let nearness = track.at.nearness(person);
+            nearness.is_some_and(|(nearness, _)| nearness == Nearness::Fits)
+        })
+    }
+
     /// Returns the track at a position that is on no other person; confirmed ones have priority,
     /// then the nearest.
     pub(super) fn track_at(
@@ -223,6 +259,13 @@ impl Witness {
         let best = near.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         best.map(|(.., track)| track)
     }
+}
+
+/// Returns the test that ended tracks in a frame; `None` for several tests.
+fn end_test(notes: &FrameNotes) -> Option<String> {
+    let mut tests = notes.dropped.iter().filter(|entry| entry.test.starts_with(OF_TRACKS));
+    let first = tests.next()?;
+    tests.next().is_none().then(|| first.test.clone())
 }
 
 impl SightedTrack {

@@ -99,7 +99,7 @@ fn a_measured_candidate_passes_with_the_named_values() {
         "[[detectors]]\nplugin = 'other'\nconfig = { refine_cost = 0.4 }\n[[detectors]]\n\
          plugin = 'depth-template'\n[detectors.config]\nrefine_cost = 0.4\ndiscover_cost = 0.3\n\
          min_cells = 2\nmin_body = 0.5\n[manager]\nplugin = 'manage-sprt'\n\
-         config = { start_log_odds = 0.0 }\n",
+         config = { start_log_odds = 0.0, end_log_odds = -2.0 }\n",
     )
     .expect("a config");
     let cost = value("cost", 0.4712, &[("refine_cost", 0.4), ("discover_cost", 0.3)]);
@@ -120,6 +120,13 @@ fn a_measured_candidate_passes_with_the_named_values() {
             value("log-odds", -1.303, &[("start_log_odds", 0.0)]),
             "start_log_odds = -1.31 }",
         ),
+        // The score was rounded up, perhaps.
+        (
+            "score",
+            value("log-odds", -2.93, &[("start_log_odds", 0.0), ("end_log_odds", -2.0)]),
+            "{ start_log_odds = -2.94, end_log_odds = -2.95 }",
+        ),
+        ("body below", value("body", 0.0, &[("min_body", 0.5)]), "config.min_body = 0.0 ("),
     ] {
         let told = remedies.sentence_measured(test, &measured, &config);
         assert!(told.contains(with), "{told}");

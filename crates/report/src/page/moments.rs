@@ -124,8 +124,11 @@ impl Page<'_> {
 
     fn deciding_anywhere(&self, test: &str) -> Markup {
         let tasks = self.view.pipelines.iter().flat_map(|p| self.view.done(p));
-        let why = tasks.filter_map(|task| task.reasons.get(test)).next();
-        html! { @if let Some(why) = why { span class="why" { (why) } } }
+        let mut told = tasks.filter_map(|task| Some((&task.pipeline, task.reasons.get(test)?)));
+        let Some((pipeline, why)) = told.next() else { return html! {} };
+        // The counts of a row are those of pipelines with other settings, too.
+        let is_of_all = told.all(|(_, other)| other == why);
+        html! { span class="why" { @if !is_of_all { (pipeline) ": " } (why) } }
     }
 
     fn moment(&self, moment: &Moment) -> Markup {
@@ -216,13 +219,31 @@ fn fate_of(
     match miss {
         Some((task, miss)) => html! {
             strong class="bad" { "✕ " (miss.name().unwrap_or(NO_CANDIDATE)) }
-            @if let Some(why) = miss.cause.and_then(|cause| task.causes.get(cause)) { span class="why line" { (why) } }
+            @if let Some(why) = miss.cause.and_then(|cause| task.causes.get(cause)) {
+                span class="why line" {
+                    @for (at, part) in parts_of(why).iter().enumerate() { @if at > 0 { wbr; } (part) }
+                }
+            }
         },
         None => match track_on(moment, pipeline, id) {
             Some(track) => html! { "● track " (track) },
             None => html! { "●" },
         },
     }
+}
+
+/// Splits a sentence after the dots within the path of a setting, where a narrow column may break it.
+fn parts_of(why: &str) -> Vec<&str> {
+    let mut parts = Vec::new();
+    let mut from = 0;
+    for (dot, _) in why.match_indices('.') {
+        if why[dot + 1..].starts_with(char::is_alphabetic) {
+            parts.push(&why[from..=dot]);
+            from = dot + 1;
+        }
+    }
+    parts.push(&why[from..]);
+    parts
 }
 
 fn outline([x, y, width, height]: &Box, class: &str, stroke: f64) -> Markup {
