@@ -46,6 +46,9 @@ impl Twist {
 
 /// Step between neighbouring poses beyond which the odometry has jumped, m.
 pub const MAX_ODOMETRY_STEP_M: f64 = 1.0;
+/// Turn between neighbouring poses beyond which the odometry has jumped, rad: a quarter turn within
+/// [`MAX_ODOMETRY_GAP_S`] is faster than robots turn.
+pub const MAX_ODOMETRY_STEP_RAD: f64 = std::f64::consts::FRAC_PI_2;
 /// Gap in the odometry beyond which poses are stale, s.
 pub const MAX_ODOMETRY_GAP_S: f64 = 0.5;
 /// Longest time over which the uncertainty of an unknown motion grows, s.

@@ -246,7 +246,10 @@ impl CommandLimiter {
         let motion = &frame.motion;
         let travel = motion.forward.hypot(motion.left);
         // At least 50 ms: over a shorter time, small odometry errors would look like high speeds.
-        if travel > self.settings.max_odometry_mps * motion.dt.max(0.05) {
+        let dt_s = motion.dt.max(0.05);
+        let is_too_far = travel > self.settings.max_odometry_mps * dt_s;
+        let is_turned = motion.turn.abs() > self.settings.max_odometry_radps * dt_s;
+        if is_too_far || motion.turn.is_finite() && is_turned {
             self.latch("odometry jumped");
         }
         self.late = None;

@@ -389,6 +389,18 @@ fn a_jump_of_odometry_lasts_until_armed() {
 }
 
 #[test]
+fn a_turn_faster_than_any_robot_is_a_jump_of_odometry() {
+    for (turn_rad, dt_s, is_jump) in
+        [(0.64, 0.1, true), (-3.0, 0.1, true), (0.62, 0.1, false), (0.3, 0.01, false)]
+    {
+        let (mut limiter, _) = at_speed(0.5, 0.5);
+        limiter.check_motion(&moved(EgoMotion { turn: turn_rad, ..EgoMotion::at_rest(dt_s) }));
+        let fault = is_jump.then_some("odometry jumped");
+        assert_eq!(limiter.fault(), fault, "{turn_rad} rad in {dt_s} s");
+    }
+}
+
+#[test]
 fn stopping_takes_what_physics_says() {
     let settings = CommandLimiterSettings { margin_m: 0.0, ..CommandLimiterSettings::default() };
     assert!((settings.stopping_m(0.9) - 0.945).abs() < 1e-9, "with the rise of the deceleration");

@@ -410,7 +410,7 @@ impl Assembler {
             && self.previous.is_some_and(|(then, _)| intake.poses.jumped_between(then, stamp));
         if jumped {
             tally.count("odometry_jump_frames");
-            tally.note("odometry jumps by more than a metre at some frames");
+            tally.note("odometry jumps by more than a metre, or a quarter turn, at some frames");
         }
         jumped
     }
