@@ -116,6 +116,9 @@ pub struct Frame {
     /// Time from the capture of the frame until it was handed over, s, by the clock of the stamps;
     /// `None` where there is no such clock, as for a log.
     pub latency_s: Option<f64>,
+    /// Inputs that the source of the frames reads besides what the frames are made of: a frame that
+    /// lacks one of them is one of a silent sensor, also if it never delivered.
+    pub expected: Inputs,
     sensors: Sensors,
     grey: OnceLock<Arc<GreyImage>>,
     derived: Mutex<BTreeMap<TypeId, Arc<Slot>>>,
@@ -151,6 +154,7 @@ impl Frame {
             odometry_age_s: 0.0,
             odometry_jumped: false,
             latency_s: None,
+            expected: Inputs::NONE,
             sensors,
             grey: OnceLock::new(),
             derived: Mutex::default(),
@@ -175,6 +179,11 @@ impl Frame {
     /// Returns the frame with [`Frame::latency_s`] as given.
     pub fn with_latency(self, latency_s: Option<f64>) -> Self {
         Self { latency_s, ..self }
+    }
+
+    /// Returns the frame with [`Frame::expected`] as given.
+    pub fn with_expected(self, expected: Inputs) -> Self {
+        Self { expected, ..self }
     }
 
     /// Returns the frame with the data of one more sensor, in place of data of the same type.
@@ -339,6 +348,7 @@ impl Frame {
             .with_odometry_age(self.odometry_age_s)
             .with_odometry_jump(self.odometry_jumped)
             .with_latency(self.latency_s)
+            .with_expected(self.expected)
     }
 
     /// Returns the image of a kind, if the frame carries one.

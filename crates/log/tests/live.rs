@@ -155,6 +155,24 @@ fn what_is_missing_is_named_until_it_comes() {
     assert!(error.to_string().contains("did you mean `/odom`?"), "{error}");
 }
 
+/// The frames say which sensors they should have, so that one that never delivers is not taken for one
+/// that the robot does not have.
+#[test]
+fn frames_name_a_scanner_that_is_announced_and_never_delivers() {
+    let log = driven(6);
+    for laser_topic in [None, Some("/scan".to_owned())] {
+        let is_named = laser_topic.is_some();
+        let input = InputSettings { laser_topic, ..InputSettings::default() };
+        let mut listening = listen(&log, &input, DEPTH);
+        listening.announce("/scan", "sensor_msgs/msg/LaserScan");
+        let mut source = listening.start().unwrap();
+        replay(&log, |topic, _, data| source.take(topic, data));
+        let frame = source.newest_frame().unwrap().frame;
+        assert_eq!(frame.expected.uses(Input::Laser), is_named);
+        assert!(frame.expected.uses(Input::Depth) && frame.laser().is_none());
+    }
+}
+
 /// Returns the frame of a colour and a depth image that arrive at this time.
 fn frame_at(source: &mut LiveSource, stamp: Stamp, arrival_ns: u64) -> LogFrame {
     let mut next = started();

@@ -50,7 +50,7 @@ use space::Presence;
 pub(crate) use sweep::{Allowance, Braking, reach_m};
 use sweep::{Hazard, HazardKind, allowance};
 use tagalong_core::{
-    CameraImage, DepthImage, EgoMotion, Frame, ObstacleReadings, Reason, Track, TrackId,
+    CameraImage, DepthImage, EgoMotion, Frame, Input, ObstacleReadings, Reason, Track, TrackId,
 };
 use zones::Zones;
 
@@ -191,6 +191,9 @@ impl CollisionMonitor {
         let taken = frame.sensor::<CameraImage<DepthImage>>().ok();
         // A frame is made of its images, so that each of them is new with it.
         self.depth_age.update(taken.map(|_| (frame.stamp, 0.0)), motion.dt);
+        if frame.expected.uses(Input::Depth) {
+            self.depth_age.expect();
+        }
         let image = taken.map(|taken| (&*frame.camera, &taken.image));
         self.depth.update(&self.settings, image, motion, tracks, target);
         if taken.is_some()
@@ -208,6 +211,9 @@ impl CollisionMonitor {
         // A scan of after its frame is as new as it can be.
         let stamped = stamp.map(|stamp| (stamp, frame.stamp.seconds_since(stamp).max(0.0)));
         let is_new = self.laser_age.update(stamped, motion.dt);
+        if frame.expected.uses(Input::Laser) {
+            self.laser_age.expect();
+        }
         self.laser.update(&self.settings, scan.filter(|_| is_new), motion, tracks);
         self.update_further_lasers(frame, motion, tracks);
     }
@@ -223,6 +229,8 @@ impl CollisionMonitor {
             let stamp = scan.map(|scan| scan.stamp.unwrap_or(frame.stamp));
             let stamped = stamp.map(|stamp| (stamp, frame.stamp.seconds_since(stamp).max(0.0)));
             let is_new = age.update(stamped, motion.dt);
+            // The source of the frames names each scanner that it reads.
+            age.expect();
             laser.update(&self.settings, scan.filter(|_| is_new), motion, tracks);
         }
     }
@@ -316,7 +324,8 @@ impl CollisionMonitor {
         Some((self.settings.slowdown_ratio, self.zones.slowdown_reason()?))
     }
 
-    /// Returns true if a sensor that once delivered, or a configured source, is silent.
+    /// Returns true if a sensor that once delivered or is expected to, or a configured source, is
+    /// silent.
     fn is_silent(&self, patience_s: f64) -> bool {
         self.depth_age.is_silent(patience_s)
             || self.laser_age.is_silent(patience_s)

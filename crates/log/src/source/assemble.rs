@@ -367,7 +367,8 @@ impl Assembler {
             frame: Frame::of_sensors(self.index, stamp, camera, motion, sensors)
                 .with_changed_calibration(intake.watch.has_changed(stamp))
                 .with_odometry_age(odometry_age_s(plan, stamp, intake))
-                .with_odometry_jump(odom_jumped),
+                .with_odometry_jump(odom_jumped)
+                .with_expected(plan.expected()),
             odom_from_robot: here.pose,
             odom_stale: here.stale || !known,
         }

@@ -99,6 +99,18 @@ impl Plan {
         self.chosen.colour.is_some() && self.chosen.depth.is_some()
     }
 
+    /// Returns the inputs of obstacle sensors that are read besides what the frames are made of.
+    pub(super) fn expected(&self) -> Inputs {
+        let mut expected = Inputs::NONE;
+        if self.has_second_depth() {
+            expected = expected.accept(Input::Depth);
+        }
+        if self.chosen.sensor(Input::Laser).is_some() {
+            expected = expected.accept(Input::Laser);
+        }
+        expected
+    }
+
     /// Returns true if the pixels of the images from which the frames are made are used, and not
     /// only their stamps and size.
     pub(super) fn reads_primary(&self) -> bool {

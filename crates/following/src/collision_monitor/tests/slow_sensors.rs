@@ -208,3 +208,44 @@ fn after_a_jump_of_the_clock_a_scanner_is_silent_until_its_next_scan() {
     let expected = [[None; 4], [Some(Reason::Silent); 4], [None; 4]].concat();
     assert_eq!(reasons, expected);
 }
+
+/// A topic that is announced or named, but on which nothing is ever published, is no free way.
+#[test]
+fn a_sensor_that_is_read_and_never_delivers_is_silent() {
+    for (expected, reason) in [
+        (Inputs::NONE, None),
+        (Inputs::NONE.accept(Input::Laser), Some(Reason::Silent)),
+        (Inputs::NONE.accept(Input::Depth), None),
+    ] {
+        let mut monitor = monitor();
+        for index in 0..3 {
+            let depth = Some(depth_at(index, 0.0, 0.0));
+            let frame = frame(index, EgoMotion::at_rest(0.1), depth, None).with_expected(expected);
+            monitor.update(&frame, &frame.motion, &[], None);
+        }
+        assert_eq!(monitor.stop_reason(0.5), reason, "{expected:?}");
+    }
+    let expected = Inputs::NONE.accept(Input::Depth);
+    let mut monitor = monitor();
+    for index in 0..3 {
+        let scan = Some(scan_at(index, 0.0, 0.0, |_| None));
+        let frame = frame(index, EgoMotion::at_rest(0.1), None, scan).with_expected(expected);
+        monitor.update(&frame, &frame.motion, &[], None);
+    }
+    assert_eq!(monitor.stop_reason(0.5), Some(Reason::Silent), "the camera");
+}
+
+#[test]
+fn a_further_scanner_that_never_delivers_is_silent() {
+    let mut monitor = monitor();
+    let mut reasons = Vec::new();
+    for index in 0..4 {
+        let further = (index == 3).then(|| scan_at(index, 0.0, 0.0, |_| None));
+        let depth = Some(depth_at(index, 0.0, 0.0));
+        let frame = frame(index, EgoMotion::at_rest(0.1), depth, None)
+            .with_sensor(FurtherScans(Arc::new([further])));
+        monitor.update(&frame, &frame.motion, &[], None);
+        reasons.push(monitor.stop_reason(0.5));
+    }
+    assert_eq!(reasons, [Some(Reason::Silent), Some(Reason::Silent), Some(Reason::Silent), None]);
+}
