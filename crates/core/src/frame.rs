@@ -113,6 +113,9 @@ pub struct Frame {
     /// True if odometry has jumped since the previous frame: where the robot drove is unknown, and
     /// a robot that is steered stops.
     pub odometry_jumped: bool,
+    /// Age of the pose of the camera on the robot at the time of the frame, s: that of the oldest
+    /// moving transform to it; 0 where nothing moves. A robot is not steered by an old one.
+    pub camera_pose_age_s: f64,
     /// Time from the capture of the frame until it was handed over, s, by the clock of the stamps;
     /// `None` where there is no such clock, as for a log.
     pub latency_s: Option<f64>,
@@ -153,6 +156,7 @@ impl Frame {
             calibration_changed: false,
             odometry_age_s: 0.0,
             odometry_jumped: false,
+            camera_pose_age_s: 0.0,
             latency_s: None,
             expected: Inputs::NONE,
             sensors,
@@ -174,6 +178,11 @@ impl Frame {
     /// Returns the frame with [`Frame::odometry_jumped`] as given.
     pub fn with_odometry_jump(self, odometry_jumped: bool) -> Self {
         Self { odometry_jumped, ..self }
+    }
+
+    /// Returns the frame with [`Frame::camera_pose_age_s`] as given.
+    pub fn with_camera_pose_age(self, camera_pose_age_s: f64) -> Self {
+        Self { camera_pose_age_s, ..self }
     }
 
     /// Returns the frame with [`Frame::latency_s`] as given.
@@ -347,6 +356,7 @@ impl Frame {
             .with_changed_calibration(self.calibration_changed)
             .with_odometry_age(self.odometry_age_s)
             .with_odometry_jump(self.odometry_jumped)
+            .with_camera_pose_age(self.camera_pose_age_s)
             .with_latency(self.latency_s)
             .with_expected(self.expected)
     }

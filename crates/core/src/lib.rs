@@ -72,7 +72,7 @@ pub use manager::{
 };
 pub use mixture::match_moments;
 pub use motion::{
-    DiffDrive, EgoMotion, MAX_ODOMETRY_GAP_S, MAX_ODOMETRY_STEP_M, MAX_ODOMETRY_STEP_RAD, Twist, WheelSpeeds, planar_pose,
+    DiffDrive, EgoMotion, MAX_CAMERA_POSE_AGE_S, MAX_ODOMETRY_GAP_S, MAX_ODOMETRY_STEP_M, MAX_ODOMETRY_STEP_RAD, Twist, WheelSpeeds, planar_pose,
     spatial_pose,
 };
 pub use obstacles::{ObstacleData, ObstacleReading, ObstacleReadings, RangeReading};

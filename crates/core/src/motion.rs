@@ -51,6 +51,9 @@ pub const MAX_ODOMETRY_STEP_M: f64 = 1.0;
 pub const MAX_ODOMETRY_STEP_RAD: f64 = std::f64::consts::FRAC_PI_2;
 /// Gap in the odometry beyond which poses are stale, s.
 pub const MAX_ODOMETRY_GAP_S: f64 = 0.5;
+/// Age of the newest transform to the camera beyond which its pose is unknown, s: moving transforms are
+/// published at least once a second, on most robots 10 to 50 times.
+pub const MAX_CAMERA_POSE_AGE_S: f64 = 1.5;
 /// Longest time over which the uncertainty of an unknown motion grows, s.
 const MAX_UNKNOWN_S: f64 = 5.0;
 

@@ -20,7 +20,9 @@ use std::time::{Duration, Instant};
 
 use ramp::{Axis, AxisLimits};
 use response::{Response, ResponseCheck};
-use tagalong_core::{Command, DiffDrive, Frame, Reason, Stamp, Twist, WheelSpeeds};
+use tagalong_core::{
+    Command, DiffDrive, Frame, MAX_CAMERA_POSE_AGE_S, Reason, Stamp, Twist, WheelSpeeds,
+};
 
 use crate::collision_monitor::{Allowance, Braking, Path};
 use crate::{Base, OdometrySource, RobotSettings};
@@ -240,7 +242,7 @@ impl CommandLimiter {
         }
     }
 
-    /// Judges the odometry of a frame, and how late images and wheels are. Latches a fault if the
+    /// Judges the odometry of a frame, the pose of its camera, and how late images and wheels are. Latches a fault if the
     /// odometry moved faster than the robot can, or the robot does not move as it was commanded.
     pub(crate) fn check_motion(&mut self, frame: &Frame) {
         let motion = &frame.motion;
@@ -261,6 +263,10 @@ impl CommandLimiter {
                 self.late = Some(Reason::Odometry);
             }
             self.is_odometry_old = frame.odometry_age_s > self.settings.slow_after_s;
+        }
+        let is_placed = frame.camera_pose_age_s <= MAX_CAMERA_POSE_AGE_S;
+        if !is_placed {
+            self.late = self.late.or(Some(Reason::CameraPose));
         }
         let image_s = frame.latency_s.unwrap_or(0.0);
         let is_in_time = image_s <= self.settings.reaction_s;

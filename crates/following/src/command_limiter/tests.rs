@@ -498,6 +498,11 @@ fn odometry_that_is_old_or_no_number_and_late_images_stop() {
         let turned = moved(EgoMotion { turn: broken, ..EgoMotion::at_rest(0.1) });
         assert_eq!(reason(turned), (Reason::Odometry, true));
     }
+    assert_eq!(reason(still().with_camera_pose_age(1.4)), (Reason::Follow, false));
+    for age_s in [1.6, f64::INFINITY, f64::NAN] {
+        let frame = still().with_camera_pose_age(age_s);
+        assert_eq!(reason(frame), (Reason::CameraPose, true), "{age_s}");
+    }
     assert_eq!(reason(still().with_latency(Some(0.2))), (Reason::Follow, false));
     for latency_s in [0.51, f64::NAN] {
         let late = still().with_latency(Some(latency_s));
