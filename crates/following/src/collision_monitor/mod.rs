@@ -52,6 +52,7 @@ use sweep::{Hazard, HazardKind, allowance};
 use tagalong_core::{
     CameraImage, DepthImage, EgoMotion, Frame, Input, ObstacleReadings, Reason, Track, TrackId,
 };
+use watchdog::{NoReference, Watch};
 use zones::Zones;
 
 use crate::RobotSettings;
@@ -86,6 +87,8 @@ pub(crate) struct CollisionMonitor {
     /// Camera of the frames.
     depth: DepthState,
     depth_age: Freshness,
+    /// Watch over the colour or grey image, by which people are detected and known again.
+    picture: Watch<NoReference>,
     /// Scanner of the frames.
     laser: ScanState,
     laser_age: Freshness,
@@ -104,6 +107,7 @@ impl CollisionMonitor {
         Self {
             depth: DepthState::new(footprint.clone()),
             depth_age: Freshness::default(),
+            picture: Watch::default(),
             laser: ScanState::default(),
             laser_age: Freshness::default(),
             further_lasers: Vec::new(),
@@ -136,6 +140,7 @@ impl CollisionMonitor {
     /// Forgets that a sensor was frozen, after a person has checked the robot.
     pub(crate) fn arm(&mut self) {
         self.depth.arm();
+        self.picture = Watch::default();
         self.laser.arm();
         for (laser, _) in &mut self.further_lasers {
             laser.arm();
@@ -155,6 +160,7 @@ impl CollisionMonitor {
     ) {
         let target = tracks.iter().find(|track| Some(track.id) == followed);
         self.update_depth(frame, motion, tracks, target);
+        self.picture.add_picture(&frame.images());
         self.update_laser(frame, motion, tracks);
         let readings = frame.sensor::<ObstacleReadings>();
         let readings = readings.map_or(&[][..], |readings| &readings.0);
@@ -282,7 +288,8 @@ impl CollisionMonitor {
 
     /// Returns true if the images are frozen and show an earlier time now.
     pub(crate) fn shows_past(&self) -> bool {
-        self.depth.shows_past(self.most_identical())
+        let most = self.most_identical();
+        self.depth.shows_past(most) || self.picture.shows_past(most)
     }
 
     /// Returns the number of identical readings from which on a sensor is frozen; 0 for none.
@@ -295,6 +302,9 @@ impl CollisionMonitor {
     fn first_frozen(&self, most: u32) -> Option<String> {
         if self.depth.is_frozen(most) {
             return Some("the depth image".to_owned());
+        }
+        if self.picture.is_frozen(most) {
+            return Some("the colour image".to_owned());
         }
         if self.laser.is_frozen(most) {
             return Some("the laser scanner".to_owned());

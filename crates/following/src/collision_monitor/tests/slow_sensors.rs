@@ -188,6 +188,49 @@ fn a_sensor_that_contradicted_the_odometry_stays_frozen_until_the_robot_is_armed
     assert_eq!(same_picture(&mut monitor, 40..60, 0.0), None);
 }
 
+/// Returns the reason to stand after frames of depth that goes on, beside pictures whose grey value at
+/// one place is this one by the number of the frame; the rest has two values, or one.
+fn beside_picture(
+    monitor: &mut CollisionMonitor,
+    grey: impl Fn(usize) -> u8,
+    is_of_one_value: bool,
+) -> Option<Reason> {
+    for index in 0..6 {
+        let shade = |u: usize, v: usize| match (u, v) {
+            (40, 39) => grey(index),
+            (80, _) if !is_of_one_value => 200,
+            _ => grey(0),
+        };
+        let images = Images {
+            colour: Some(Arc::new(RgbImage::from_fn(160, 120, |u, v| [shade(u, v), 0, 9]))),
+            depth: Some(Arc::new(depth_at(index, 0.0, 0.0))),
+            ..Images::default()
+        };
+        let stamp = Stamp::default().plus_seconds(index as f64 * 0.1);
+        let motion = EgoMotion::at_rest(0.1);
+        let frame = Frame::new(index as u64, stamp, Arc::new(camera()), motion, images);
+        monitor.update(&frame, &motion, &[], None);
+    }
+    monitor.stop_reason(0.5)
+}
+
+/// People are detected, verified and known again by colour: where it stands still, they are not where
+/// they seem to be, though depth goes on.
+#[test]
+fn the_same_colour_image_again_is_frozen_and_darkness_is_not() {
+    let mut frozen = monitor();
+    assert_eq!(beside_picture(&mut frozen, |_| 7, false), Some(Reason::Frozen));
+    assert_eq!(frozen.frozen_sensor(), Some(("the colour image".into(), false)));
+    assert!(frozen.shows_past());
+    assert_eq!(beside_picture(&mut monitor(), |index| index as u8, false), None, "with noise");
+    assert_eq!(beside_picture(&mut monitor(), |_| 0, true), None, "in the dark");
+    frozen.arm();
+    assert_eq!(frozen.frozen_sensor(), None);
+    let noiseless =
+        CollisionMonitorSettings { noiseless: true, ..CollisionMonitorSettings::default() };
+    assert_eq!(beside_picture(&mut monitor_of(noiseless), |_| 7, false), None, "as it is said");
+}
+
 /// The newest scan of before the jump says nothing of now, also where it comes again with each frame.
 #[test]
 fn after_a_jump_of_the_clock_a_scanner_is_silent_until_its_next_scan() {
