@@ -298,15 +298,15 @@ impl Bridge {
         }
     }
 
-    /// Ends the run if the camera's calibration is no longer valid, because the positions of people
+    /// Ends the run if the calibration of a camera is no longer valid, because the positions of people
     /// and obstacles would be wrong.
     fn check_calibration(&self) -> Result<(), BridgeError> {
         let changes = self.source.counters().get("camera_info_changes").copied().unwrap_or(0);
         if changes == 0 || self.wheels.is_none() {
             return Ok(());
         }
-        let topic = self.source.facts().calibration_topic.unwrap_or_default();
-        Err(BridgeError::Calibration(topic))
+        let topic = self.source.changed_calibration().unwrap_or_default();
+        Err(BridgeError::Calibration(topic.to_owned()))
     }
 
     /// Reports notes of the source, changes of the permission to move and other command publishers,

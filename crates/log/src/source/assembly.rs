@@ -45,6 +45,11 @@ impl Assembly {
         }
     }
 
+    /// Returns the topic of the first calibration that changed.
+    pub(super) fn changed_calibration(&self) -> Option<&str> {
+        self.intake.watch.changed_info()
+    }
+
     /// Returns true for topics with messages that are used.
     pub(super) fn reads(&self, channel: &Channel) -> bool {
         Type::of(&channel.schema_name) == Type::Tf || self.plan.reads(&channel.topic)

@@ -61,7 +61,7 @@ impl Plan {
 
     /// Returns true for a topic whose messages are used.
     pub(super) fn reads(&self, topic: &str) -> bool {
-        self.chosen.has(topic) || self.sources.iter().any(|source| source.topic.topic == topic)
+        self.chosen.has(topic) || self.sources.iter().any(|source| source.has(topic))
     }
 
     /// Returns the topics of the further obstacle sources, keyed by the names of the sources.
