@@ -27,6 +27,8 @@ use tagalong_core::{
 use crate::collision_monitor::{Allowance, Braking, Path};
 use crate::{Base, OdometrySource, RobotSettings};
 
+/// Delay of the wheels, in reaction times, beyond which it is a fault.
+const LATEST: f64 = 2.0;
 /// Longest time over which the robot may have changed its speed, s. A pause of frames must not
 /// allow a large step of the speed.
 const LONGEST_STEP_S: f64 = 0.2;
@@ -279,7 +281,7 @@ impl CommandLimiter {
                 let answered_s =
                     if wheels_s > 0.0 { image_s + motion.dt + wheels_s } else { image_s };
                 self.reaction_s = self.settings.reaction_s.max(answered_s);
-                if wheels_s > 2.0 * self.settings.reaction_s {
+                if wheels_s > LATEST * self.settings.reaction_s {
                     self.latch("the base responds too late to its commands");
                 }
             }
@@ -328,7 +330,7 @@ impl CommandLimiter {
         self.last = None;
         self.is_withdrawn = false;
         self.motion = Motion::default();
-        self.response.clear();
+        self.response.arm(LATEST * self.settings.reaction_s);
     }
 
     /// Returns the reason for an emergency stop, if there is one: the wheels stop at once.
