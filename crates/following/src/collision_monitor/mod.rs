@@ -346,8 +346,8 @@ impl CollisionMonitor {
     /// Returns true if the frame has depth or a scan, or a source sees obstacles.
     fn has_eyes(&self) -> bool {
         self.depth_age.delivers()
-            || self.laser_age.delivers()
-            || self.further_lasers.iter().any(|(_, age)| age.delivers())
+            || self.laser_age.delivers() && self.laser.is_eye()
+            || self.further_lasers.iter().any(|(laser, age)| age.delivers() && laser.is_eye())
             || self.sources.iter().any(FurtherSource::is_eye)
     }
 

@@ -196,13 +196,13 @@ fn beside_picture(
     is_of_one_value: bool,
 ) -> Option<Reason> {
     for index in 0..6 {
-        let shade = |u: usize, v: usize| match (u, v) {
-            (40, 39) => grey(index),
-            (80, _) if !is_of_one_value => 200,
-            _ => grey(0),
-        };
+        let colour = RgbImage::from_fn(160, 120, |u, v| match (u, v) {
+            (40, 39) => [grey(index), 0, 9],
+            (80, _) if !is_of_one_value => [200, 0, 9],
+            _ => [grey(0), 0, 9],
+        });
         let images = Images {
-            colour: Some(Arc::new(RgbImage::from_fn(160, 120, |u, v| [shade(u, v), 0, 9]))),
+            colour: Some(Arc::new(colour)),
             depth: Some(Arc::new(depth_at(index, 0.0, 0.0))),
             ..Images::default()
         };
@@ -276,6 +276,32 @@ fn a_sensor_that_is_read_and_never_delivers_is_silent() {
         monitor.update(&frame, &frame.motion, &[], None);
     }
     assert_eq!(monitor.stop_reason(0.5), Some(Reason::Silent), "the camera");
+}
+
+/// A level scanner above `top_m` sees none of what could be in the way: alone it is no eye, and beside a
+/// camera it does not say that a dark part of its image is free.
+#[test]
+fn a_scanner_above_the_robot_does_not_see_the_way() {
+    for (height_m, nods_rad, range_m, reason) in [
+        (1.4, 0.0, 5.0, None),
+        (1.9, 0.0, 5.0, Some(Reason::Blind)),
+        (1.9, 0.0, f64::INFINITY, Some(Reason::Blind)),
+        (1.9, 0.3, 5.0, None),
+        (1.9, 0.3, f64::INFINITY, None),
+    ] {
+        let mut monitor = monitor();
+        for index in 0..3 {
+            let scan = scan_of(nodding(height_m, nods_rad), [range_m; 360]);
+            let frame = frame(index, EgoMotion::at_rest(0.1), None, Some(scan));
+            monitor.update(&frame, &frame.motion, &[], None);
+        }
+        assert_eq!(monitor.stop_reason(0.5), reason, "{height_m} m {nods_rad} rad {range_m} m");
+    }
+    let settings = CollisionMonitorSettings::default();
+    for (height_m, looks) in [(1.4, true), (1.9, false)] {
+        let empty = LaserScan::of_points(Vec::new()).with_scanner(nodding(height_m, 0.0));
+        assert_eq!(Coverage::of_scan(&settings, &empty, 0.3).looks(), looks, "{height_m} m");
+    }
 }
 
 #[test]
