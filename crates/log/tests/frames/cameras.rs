@@ -197,7 +197,7 @@ fn a_mount_that_is_on_tf_once_is_held_and_told() {
     let found = frames(&mut source);
     let ages: Vec<f64> = found.iter().map(|found| found.frame.camera_pose_age_s).collect();
     assert_eq!(ages.len(), 20);
-    // Whoever steers by the frames knows that the pose that is held is old.
+    // A robot that is steered by the frames stops: the pose that is held is old.
     assert!((ages[19] - 1.9).abs() < 1e-6 && ages[3] < 0.31, "{ages:?}");
     let held = count(&source, "frames_without_camera_pose");
     assert!((10..20).contains(&held), "{held}");
