@@ -10,7 +10,7 @@ use tagalong::pipeline::{Enable, EnableSwitch, FrameReport, Permission, Pipeline
 use tagalong_view::Live;
 
 use crate::diagnostics::{Diagnostics, Status};
-use crate::inbox::{Arrival, Inbox};
+use crate::inbox::{Arrival, Inbox, lasting};
 use crate::nav2::{Follower, ends_goal};
 use crate::network::{Ear, Network};
 use crate::options::Setup;
@@ -233,10 +233,17 @@ impl Bridge {
         self.told = None;
     }
 
-    /// Prepares for working after a rest.
-    pub(crate) fn resume(&mut self) {
-        // Images that arrived in the meantime are old.
-        drop(self.inbox.take(Duration::ZERO));
+    /// Prepares for working after a rest, in which speed limits and static transforms may have come.
+    pub(crate) fn resume(&mut self, tell: &dyn Fn(&str)) {
+        for Arrival { topic, arrival_ns, message } in
+            lasting(self.inbox.take(Duration::ZERO), &self.options.speed_limit)
+        {
+            if topic == self.options.speed_limit {
+                self.limit_speed(&message, tell);
+            } else {
+                self.source.take_at(&topic, &message, arrival_ns);
+            }
+        }
         if let Some(switch) = self.switch() {
             switch.resume();
         }
@@ -291,15 +298,15 @@ impl Bridge {
         }
     }
 
-    /// Ends the run if the camera's calibration is no longer valid, because the positions of people
+    /// Ends the run if the calibration of a camera is no longer valid, because the positions of people
     /// and obstacles would be wrong.
     fn check_calibration(&self) -> Result<(), BridgeError> {
         let changes = self.source.counters().get("camera_info_changes").copied().unwrap_or(0);
         if changes == 0 || self.wheels.is_none() {
             return Ok(());
         }
-        let topic = self.source.facts().calibration_topic.unwrap_or_default();
-        Err(BridgeError::Calibration(topic))
+        let topic = self.source.changed_calibration().unwrap_or_default();
+        Err(BridgeError::Calibration(topic.to_owned()))
     }
 
     /// Reports notes of the source, changes of the permission to move and other command publishers,

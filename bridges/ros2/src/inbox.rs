@@ -105,9 +105,31 @@ impl Inbox {
     }
 }
 
+/// Returns the messages that hold until the next one on their topic, however old they are: speed limits
+/// and static transforms, which are published once.
+pub(crate) fn lasting(arrivals: Vec<Arrival>, speed_limit: &str) -> Vec<Arrival> {
+    let mut kept = arrivals;
+    kept.retain(|Arrival { topic, .. }| topic == speed_limit || topic.ends_with("tf_static"));
+    kept
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What is published once and arrives while the node is inactive is not published again.
+    #[test]
+    fn limits_and_static_transforms_outlast_a_rest() {
+        let inbox = Inbox::default();
+        for topic in ["/image", "/tf", "/tf_static", "/robot1/tf_static", "speed_limit", "reset"] {
+            (0..3).for_each(|i| inbox.push(topic, vec![i], 2));
+        }
+        let kept = lasting(inbox.take(Duration::ZERO), "speed_limit");
+        let kept: Vec<(&str, u8)> =
+            kept.iter().map(|arrival| (arrival.topic.as_str(), arrival.message[0])).collect();
+        let expected = ["/robot1/tf_static", "/tf_static", "speed_limit"];
+        assert_eq!(kept, expected.map(|topic| [(topic, 1), (topic, 2)]).concat());
+    }
 
     #[test]
     fn the_oldest_are_dropped_and_counted() {

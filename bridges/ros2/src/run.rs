@@ -211,7 +211,7 @@ impl Node<'_> {
 
     fn activate(&mut self) -> Ending {
         if let Body::Working(bridge, _) = &mut self.body {
-            bridge.resume();
+            bridge.resume(self.tell);
         }
         Ending::Success
     }

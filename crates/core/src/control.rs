@@ -107,6 +107,8 @@ pub enum Reason {
     Frozen,
     /// Stop: the odometry is missing, too old, or no number.
     Odometry,
+    /// Stop: the pose of the camera on the robot is too old, because tf does not come.
+    CameraPose,
     /// Stop: images or wheels respond later than the reaction time allows.
     Late,
     /// Stop: a bumper is pressed.
@@ -145,6 +147,7 @@ impl Reason {
             Self::Silent => "silent",
             Self::Frozen => "frozen",
             Self::Odometry => "odometry",
+            Self::CameraPose => "camera-pose",
             Self::Late => "late",
             Self::Contact => "contact",
             Self::NoTarget => "no-target",
@@ -177,6 +180,7 @@ impl Reason {
                 "stands: a sensor repeats itself, or does not change as the odometry says"
             }
             Self::Odometry => "stands: the odometry is missing, too old, or no number",
+            Self::CameraPose => "stands: tf does not say any more where the camera is on the robot",
             Self::Late => "stands: images or wheels respond too late",
             Self::Contact => "stands: a bumper is pressed",
             Self::Blind => "stands: depth has no readings, or there is no sensor of obstacles",
@@ -314,7 +318,7 @@ pub trait Controller: Send {
 mod tests {
     use super::*;
 
-    const ALL: [Reason; 24] = [
+    const ALL: [Reason; 25] = [
         Reason::Follow,
         Reason::Limited,
         Reason::Unsure,
@@ -331,6 +335,7 @@ mod tests {
         Reason::Silent,
         Reason::Frozen,
         Reason::Odometry,
+        Reason::CameraPose,
         Reason::Late,
         Reason::Contact,
         Reason::NoTarget,

@@ -113,9 +113,15 @@ pub struct Frame {
     /// True if odometry has jumped since the previous frame: where the robot drove is unknown, and
     /// a robot that is steered stops.
     pub odometry_jumped: bool,
+    /// Age of the pose of the camera on the robot at the time of the frame, s: that of the oldest
+    /// moving transform to it; 0 where nothing moves. A robot is not steered by an old one.
+    pub camera_pose_age_s: f64,
     /// Time from the capture of the frame until it was handed over, s, by the clock of the stamps;
     /// `None` where there is no such clock, as for a log.
     pub latency_s: Option<f64>,
+    /// Inputs that the source of the frames reads besides what the frames are made of: a frame that
+    /// lacks one of them is one of a silent sensor, also if it never delivered.
+    pub expected: Inputs,
     sensors: Sensors,
     grey: OnceLock<Arc<GreyImage>>,
     derived: Mutex<BTreeMap<TypeId, Arc<Slot>>>,
@@ -150,7 +156,9 @@ impl Frame {
             calibration_changed: false,
             odometry_age_s: 0.0,
             odometry_jumped: false,
+            camera_pose_age_s: 0.0,
             latency_s: None,
+            expected: Inputs::NONE,
             sensors,
             grey: OnceLock::new(),
             derived: Mutex::default(),
@@ -172,9 +180,19 @@ impl Frame {
         Self { odometry_jumped, ..self }
     }
 
+    /// Returns the frame with [`Frame::camera_pose_age_s`] as given.
+    pub fn with_camera_pose_age(self, camera_pose_age_s: f64) -> Self {
+        Self { camera_pose_age_s, ..self }
+    }
+
     /// Returns the frame with [`Frame::latency_s`] as given.
     pub fn with_latency(self, latency_s: Option<f64>) -> Self {
         Self { latency_s, ..self }
+    }
+
+    /// Returns the frame with [`Frame::expected`] as given.
+    pub fn with_expected(self, expected: Inputs) -> Self {
+        Self { expected, ..self }
     }
 
     /// Returns the frame with the data of one more sensor, in place of data of the same type.
@@ -344,7 +362,9 @@ impl Frame {
             .with_changed_calibration(self.calibration_changed)
             .with_odometry_age(self.odometry_age_s)
             .with_odometry_jump(self.odometry_jumped)
+            .with_camera_pose_age(self.camera_pose_age_s)
             .with_latency(self.latency_s)
+            .with_expected(self.expected)
     }
 
     /// Returns the image of a kind, if the frame carries one.

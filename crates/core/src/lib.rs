@@ -72,8 +72,8 @@ pub use manager::{
 };
 pub use mixture::match_moments;
 pub use motion::{
-    DiffDrive, EgoMotion, MAX_ODOMETRY_GAP_S, MAX_ODOMETRY_STEP_M, Twist, WheelSpeeds, planar_pose,
-    spatial_pose,
+    DiffDrive, EgoMotion, MAX_CAMERA_POSE_AGE_S, MAX_ODOMETRY_GAP_S, MAX_ODOMETRY_STEP_M,
+    MAX_ODOMETRY_STEP_RAD, Twist, WheelSpeeds, planar_pose, spatial_pose,
 };
 pub use obstacles::{ObstacleData, ObstacleReading, ObstacleReadings, RangeReading};
 pub use person::{Estimate, Person};

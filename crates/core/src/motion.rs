@@ -46,8 +46,14 @@ impl Twist {
 
 /// Step between neighbouring poses beyond which the odometry has jumped, m.
 pub const MAX_ODOMETRY_STEP_M: f64 = 1.0;
+/// Turn between neighbouring poses beyond which the odometry has jumped, rad: a quarter turn within
+/// [`MAX_ODOMETRY_GAP_S`] is faster than robots turn.
+pub const MAX_ODOMETRY_STEP_RAD: f64 = std::f64::consts::FRAC_PI_2;
 /// Gap in the odometry beyond which poses are stale, s.
 pub const MAX_ODOMETRY_GAP_S: f64 = 0.5;
+/// Age of the newest transform to the camera beyond which its pose is unknown, s: moving transforms are
+/// published at least once a second, on most robots 10 to 50 times.
+pub const MAX_CAMERA_POSE_AGE_S: f64 = 1.5;
 /// Longest time over which the uncertainty of an unknown motion grows, s.
 const MAX_UNKNOWN_S: f64 = 5.0;
 

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use nalgebra::Isometry2;
-use tagalong_core::{MAX_ODOMETRY_GAP_S, MAX_ODOMETRY_STEP_M, Stamp};
+use tagalong_core::{MAX_ODOMETRY_GAP_S, MAX_ODOMETRY_STEP_M, MAX_ODOMETRY_STEP_RAD, Stamp};
 
 /// Time for which the motion is extrapolated beyond the last pose, s.
 const EXTRAPOLATE_S: f64 = 0.2;
@@ -144,7 +144,9 @@ impl PoseBuffer {
     pub fn jumped_between(&self, from: Stamp, to: Stamp) -> bool {
         let pairs = self.poses.iter().zip(self.poses.iter().skip(1));
         pairs.filter(|(a, b)| a.0 < to && from < b.0).any(|(a, b)| {
-            (b.1.translation.vector - a.1.translation.vector).norm() > MAX_ODOMETRY_STEP_M
+            let step_m = (b.1.translation.vector - a.1.translation.vector).norm();
+            let turned_rad = a.1.rotation.angle_to(&b.1.rotation);
+            (step_m > MAX_ODOMETRY_STEP_M || turned_rad > MAX_ODOMETRY_STEP_RAD)
                 // A large step over a gap may be real motion.
                 && b.0.seconds_since(a.0) <= MAX_ODOMETRY_GAP_S
         })
@@ -209,6 +211,16 @@ mod tests {
         assert!(buffer.jumped_between(at(10.05), at(10.25)));
         assert!(!buffer.jumped_between(at(9.0), at(10.1)));
         assert!(!buffer.jumped_between(at(10.2), at(10.9)));
+    }
+
+    #[test]
+    fn a_heading_that_jumps_is_seen_where_it_happens() {
+        for (turned_rad, is_jump) in [(1.6, true), (-3.0, true), (1.5, false), (6.2, false)] {
+            let mut buffer = driven(&[10.0, 10.1]);
+            let heading_rad = 0.1 * 10.1;
+            buffer.push(at(10.2), pose(10.1, heading_rad + turned_rad));
+            assert_eq!(buffer.jumped_between(at(10.05), at(10.25)), is_jump, "{turned_rad}");
+        }
     }
 
     #[test]

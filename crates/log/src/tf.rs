@@ -148,6 +148,17 @@ impl TfBuffer {
         ages.reduce(f64::max).unwrap_or(f64::INFINITY)
     }
 
+    /// Returns the age of the pose of frame `source` in frame `target` at a given time, s: that of
+    /// the oldest transform between them that only moves, by [`age_between`]. It is 0 if all of them
+    /// are static, and infinite if the frames are not connected.
+    pub(crate) fn pose_age_s(&self, target: &str, source: &str, at: Stamp) -> f64 {
+        if !self.connects(target, source) {
+            return f64::INFINITY;
+        }
+        let moving = self.moving_between(target, source).filter(|link| link.fixed.is_none());
+        moving.filter_map(|link| link.age_s(at)).fold(0.0, f64::max)
+    }
+
     /// Returns the time until the next sample of a moving transform, s, if that is too late to
     /// belong to the given time.
     pub(crate) fn ahead_s(&self, target: &str, source: &str, at: Stamp) -> Option<f64> {
@@ -360,6 +371,19 @@ mod tests {
         tf.insert(&link("odom", "base", 20.0, pose(9.0, 0.0)), false);
         assert!((tf.age_s("odom", "base", at(10.2)) - 0.1).abs() < 1e-6);
         assert!((tf.ahead_s("odom", "base", at(10.2)).unwrap() - 9.8).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_static_pose_does_not_age() {
+        let mut tf = TfBuffer::default();
+        tf.insert(&link("base", "head", 10.0, pose(1.0, 0.0)), false);
+        tf.insert(&link("head", "camera", 3.0, pose(0.1, 0.0)), true);
+        tf.insert(&link("base", "lidar", 3.0, pose(0.2, 0.0)), true);
+        assert!((tf.pose_age_s("base", "camera", at(12.0)) - 2.0).abs() < 1e-6);
+        assert_eq!(tf.pose_age_s("base", "lidar", at(900.0)), 0.0);
+        assert_eq!(tf.pose_age_s("base", "elsewhere", at(10.0)), f64::INFINITY);
+        tf.clear_moving();
+        assert_eq!(tf.pose_age_s("base", "camera", at(10.0)), f64::INFINITY);
     }
 
     #[test]

@@ -5,7 +5,8 @@ mod common;
 
 use std::io::Cursor;
 
-use common::{SavedLog, at, started};
+use common::{SavedLog, at, started, sweep};
+use nalgebra::Isometry3;
 use tagalong_core::{ObstacleData, ObstacleReadings, Stamp};
 use tagalong_log::msgs::{BoolMsg, BumperEvent, Header, Range, encode};
 use tagalong_log::{
@@ -153,6 +154,45 @@ fn what_is_missing_is_named_until_it_comes() {
     let error = listen(&log, &named, DEPTH).start().err().unwrap();
     assert!(matches!(error, LogError::UnknownTopic { .. }), "{error}");
     assert!(error.to_string().contains("did you mean `/odom`?"), "{error}");
+}
+
+/// The frames say which sensors they should have, so that one that never delivers is not taken for one
+/// that the robot does not have.
+#[test]
+fn frames_name_a_scanner_that_is_announced_and_never_delivers() {
+    let log = driven(6);
+    for laser_topic in [None, Some("/scan".to_owned())] {
+        let is_named = laser_topic.is_some();
+        let input = InputSettings { laser_topic, ..InputSettings::default() };
+        let mut listening = listen(&log, &input, DEPTH);
+        listening.announce("/scan", "sensor_msgs/msg/LaserScan");
+        let mut source = listening.start().unwrap();
+        replay(&log, |topic, _, data| source.take(topic, data));
+        let frame = source.newest_frame().unwrap().frame;
+        assert_eq!(frame.expected.uses(Input::Laser), is_named);
+        assert!(frame.expected.uses(Input::Depth) && frame.laser().is_none());
+    }
+}
+
+/// The clock is set back by two seconds, and the scanner falls silent: stamps of frames come near those
+/// of its old scans once more.
+#[test]
+fn after_a_step_of_the_clock_old_scans_are_not_taken_for_new_ones() {
+    let mut log = started();
+    log.fixed("base_link", "laser", &Isometry3::translation(0.2, 0.0, 0.3));
+    for i in 0..60 {
+        let t = if i < 30 { 0.1 * f64::from(i) } else { 0.1 * f64::from(i) - 2.0 };
+        log.odometry(at(t), 0.0, 0.0);
+        if i < 30 {
+            log.message("/scan", at(t), &sweep(at(t), "laser"));
+        }
+        log.colour(at(t));
+        log.depth(at(t), "colour", 2.0);
+    }
+    let (found, _) = live(&log.finish(), DEPTH);
+    let has_scan: Vec<bool> = found.iter().map(|found| found.frame.laser().is_some()).collect();
+    assert!(has_scan[..30].iter().all(|has| *has), "{has_scan:?}");
+    assert!(has_scan[30..].iter().all(|has| !*has), "{has_scan:?}");
 }
 
 /// Returns the frame of a colour and a depth image that arrive at this time.

@@ -3,7 +3,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry2, Isometry3};
 use tagalong_core::{
     DepthImage, EgoMotion, Frame, GreyImage, Images, Input, LaserScan, MAX_ODOMETRY_GAP_S,
-    MAX_ODOMETRY_STEP_M, RgbImage, RightImage, Sensor, Sensors, Stamp,
+    MAX_ODOMETRY_STEP_M, MAX_ODOMETRY_STEP_RAD, RgbImage, RightImage, Sensor, Sensors, Stamp,
 };
 use tagalong_geometry::Camera;
 use tagalong_pipeline::Sources;
@@ -77,8 +77,10 @@ impl FrameMaker {
         let Some((then, before)) = previous else { return (EgoMotion::at_rest(0.0), false) };
         let dt_s = stamp.seconds_since(then);
         let step_m = (here.translation.vector - before.translation.vector).norm();
+        let turned_rad = before.rotation.angle_to(&here.rotation);
+        let is_large = step_m > MAX_ODOMETRY_STEP_M || turned_rad > MAX_ODOMETRY_STEP_RAD;
         // After a long gap a large step may be real motion.
-        if step_m > MAX_ODOMETRY_STEP_M && (0.0..=MAX_ODOMETRY_GAP_S).contains(&dt_s) {
+        if is_large && (0.0..=MAX_ODOMETRY_GAP_S).contains(&dt_s) {
             return (EgoMotion::unknown(dt_s), true);
         }
         (EgoMotion::between(&before, &here, dt_s, self.odometry_sigma), false)
@@ -324,6 +326,18 @@ mod tests {
         let travelled = maker.at(at(3.1)).pose(pose(3.5)).frame().unwrap();
         assert!(!travelled.odometry_jumped);
         assert!((travelled.motion.forward - 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_heading_that_jumps_is_marked_and_a_fast_turn_is_none() {
+        let mut maker = maker();
+        maker.at(at(1.0)).pose(pose(0.0)).frame().unwrap();
+        let turned = Isometry2::new(Vector2::zeros(), 0.3);
+        assert!(!maker.at(at(1.1)).pose(turned).frame().unwrap().odometry_jumped);
+        let jumped = maker.at(at(1.2)).pose(Isometry2::new(Vector2::zeros(), 2.0)).frame();
+        let jumped = jumped.unwrap();
+        assert!(jumped.odometry_jumped);
+        assert_eq!(jumped.motion.turn, 0.0, "the motion is unknown");
     }
 
     #[test]

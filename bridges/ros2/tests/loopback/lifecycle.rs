@@ -15,7 +15,7 @@ use tagalong_sim::Simulation;
 
 use crate::Stuck;
 use crate::peers::*;
-use crate::skill::{TriggerRequest, call, call_once, client};
+use crate::skill::{SpeedLimit, TriggerRequest, call, call_once, client};
 
 /// `lifecycle_msgs/State` and `lifecycle_msgs/Transition`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -132,6 +132,9 @@ fn a_manager_leads_the_node_and_what_ends_its_work_stops_the_robot() {
     let (bridge, said) = bridge_with(options, tagalong::builtin_registry(), &stop);
     wait_for(&said, "a manager has to configure");
     let manager = Manager::new(domain(14));
+    let mut zones = Peer::join(domain(14), "zones");
+    let limits = "nav2_msgs/msg/SpeedLimit";
+    let limit = zones.publisher_of::<SpeedLimit>("/speed_limit", limits, reliable());
     let hand = Hand::new(domain(14), &stop);
     let ends = Arc::clone(&stop);
     let playing = thread::spawn(move || {
@@ -164,6 +167,8 @@ fn a_manager_leads_the_node_and_what_ends_its_work_stops_the_robot() {
     stands(&commands, asked, silent);
     sleep(Duration::from_millis(500));
     assert_eq!(tracks.so_far().len(), quiet, "nothing is tracked");
+    limit.publish(SpeedLimit::of(0.05)).unwrap();
+    sleep(Duration::from_millis(500));
 
     assert!(manager.change(3, "activate"));
     let active = Instant::now();
@@ -173,6 +178,11 @@ fn a_manager_leads_the_node_and_what_ends_its_work_stops_the_robot() {
     hand.reset_until_heard(&said);
     hand.press_again();
     commands.wait_for_move("active again, reset and pressed");
+    wait_for(&said, "speed limit: 0.05 m/s");
+    sleep(Duration::from_millis(700));
+    let fastest = commands.so_far().into_iter().filter(|(at, _)| *at > active);
+    let fastest = fastest.map(|(_, command)| command.twist.linear.x).fold(0.0, f64::max);
+    assert!(fastest <= 0.05 + 1e-9, "the limit came while it was inactive: {fastest}");
 
     assert!(manager.change(4, "") && manager.change(2, ""));
     assert_eq!(manager.state(), (1, "unconfigured".into()));

@@ -33,10 +33,17 @@ impl Message for TriggerResponse {}
 
 /// `nav2_msgs/SpeedLimit`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-struct SpeedLimit {
+pub(crate) struct SpeedLimit {
     header: Header,
     percentage: bool,
     speed_limit: f64,
+}
+
+impl SpeedLimit {
+    /// A limit of this speed, m/s.
+    pub(crate) fn of(speed_limit: f64) -> Self {
+        Self { header: Header::default(), percentage: false, speed_limit }
+    }
 }
 
 pub(crate) fn client<Q, A>(
@@ -181,8 +188,7 @@ fn a_person_is_enrolled_and_cleared_by_services_and_over_http() {
     assert_eq!(http(&address, "POST", "enroll", &body).0, 200, "{body}");
     commands.wait_for_move("the person of a track is followed");
 
-    let slow = SpeedLimit { header: Header::default(), percentage: false, speed_limit: 0.05 };
-    limit.publish(slow).unwrap();
+    limit.publish(SpeedLimit::of(0.05)).unwrap();
     wait_for(&said, "speed limit: 0.05 m/s");
     sleep(Duration::from_millis(2000));
     let limited = Instant::now();

@@ -12,6 +12,9 @@ use super::settings::NoReturn;
 /// Share of rays without a statement up to which those from which nothing came back may be free.
 const MOST_UNKNOWN: f64 = 0.1;
 
+/// Length of the way that a ray without a reflection keeps free, m, where that means free.
+pub(super) const FREE_M: f64 = 6.0;
+
 /// Directions of a scan without any ray.
 const ALL_AROUND: u32 = 360;
 
@@ -43,7 +46,8 @@ impl Coverage {
         Self { eye, looks, min_share }
     }
 
-    /// Returns the coverage of a laser scan.
+    /// Returns the coverage of a laser scan. Rays that run above all that could be in the way say
+    /// nothing of it.
     pub(super) fn of_scan(
         settings: &CollisionMonitorSettings,
         scan: &LaserScan,
@@ -53,16 +57,20 @@ impl Coverage {
         let no_return =
             if settings.no_return == NoReturn::Free { Look::Seen } else { Look::Silent };
         let mut looks = Vec::with_capacity(scan.points.len() + scan.unread.len());
-        if scan.points.is_empty() && scan.unread.is_empty() {
+        let is_below_top = scan.robot_from_scanner.translation.vector.z < settings.top_m;
+        if is_below_top && scan.points.is_empty() && scan.unread.is_empty() {
             // A program that leaves out rays without a reflection has left out all of them here.
             for ray in 0..ALL_AROUND {
                 looks.push((TAU * f64::from(ray) / f64::from(ALL_AROUND), no_return));
             }
         }
-        for point in scan.points.iter() {
+        for point in scan.points.iter().filter(|point| is_below_top || point.z < settings.top_m) {
             looks.push((direction(&eye, &point.xy()), Look::Seen));
         }
         for unread in scan.unread.iter() {
+            if !passes_way(settings, scan, unread.ray) {
+                continue;
+            }
             let look = match unread.reading {
                 RayReading::NoReturn => no_return,
                 RayReading::Reflection(_) => Look::Seen,
@@ -73,6 +81,11 @@ impl Coverage {
             looks.push((direction(&eye, &scan.place(unread.ray, 1.0).xy()), look));
         }
         Self { eye, looks, min_share }
+    }
+
+    /// Returns true if the sensor looks in any direction along the floor.
+    pub(super) fn looks(&self) -> bool {
+        !self.looks.is_empty()
     }
 
     /// Moves the directions of an earlier frame into the robot's new frame.
@@ -136,6 +149,12 @@ impl Coverage {
         let valid = if others_see && is_sound { seen + silent } else { seen };
         (looks > 0).then(|| f64::from(valid) / f64::from(looks))
     }
+}
+
+/// Returns true for a ray that runs, somewhere within [`FREE_M`], lower than the highest obstacle.
+pub(super) fn passes_way(settings: &CollisionMonitorSettings, scan: &LaserScan, ray: u32) -> bool {
+    let eye_m = scan.robot_from_scanner.translation.vector.z;
+    eye_m < settings.top_m || scan.place(ray, FREE_M).z < settings.top_m
 }
 
 /// Returns the part of the speed that all sensors together allow on a path of this length.

@@ -28,6 +28,11 @@ impl Freshness {
         fresh.is_some()
     }
 
+    /// Takes a sensor that is read, but has not delivered yet, as silent.
+    pub(super) fn expect(&mut self) {
+        self.age_s.get_or_insert(f64::INFINITY);
+    }
+
     /// Takes the newest reading as infinitely old, because what it showed is forgotten: the same reading
     /// again is not new.
     pub(super) fn clear(&mut self) {
@@ -39,7 +44,7 @@ impl Freshness {
         self.delivers
     }
 
-    /// Returns true if the sensor once delivered and its newest reading is older than `patience_s`.
+    /// Returns true if the sensor once delivered, or is expected to, and its newest reading is older than `patience_s`.
     pub(super) fn is_silent(self, patience_s: f64) -> bool {
         // Positive comparison, so that an age that is no number counts as silence.
         self.age_s.is_some_and(|age_s| {

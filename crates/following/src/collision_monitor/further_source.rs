@@ -141,9 +141,14 @@ impl FurtherSource {
         self.freshness.is_unknown() || self.freshness.is_silent(self.settings.source_timeout_s)
     }
 
-    /// Returns true for a scanner or a camera, which sees a region and not one direction.
+    /// Returns true for a scanner that sees the way, or a camera: they see a region and not one
+    /// direction.
     pub(super) fn is_eye(&self) -> bool {
-        matches!(self.settings.kind, SourceKind::Scan | SourceKind::Depth)
+        match &self.state {
+            SourceState::Scan(scan) => scan.is_eye(),
+            SourceState::Depth(_) => true,
+            SourceState::Range(_) | SourceState::Bumper(_) => false,
+        }
     }
 
     /// Returns true for a bumper that is pressed.

@@ -50,8 +50,9 @@ use space::Presence;
 pub(crate) use sweep::{Allowance, Braking, reach_m};
 use sweep::{Hazard, HazardKind, allowance};
 use tagalong_core::{
-    CameraImage, DepthImage, EgoMotion, Frame, ObstacleReadings, Reason, Track, TrackId,
+    CameraImage, DepthImage, EgoMotion, Frame, Input, ObstacleReadings, Reason, Track, TrackId,
 };
+use watchdog::{NoReference, Watch};
 use zones::Zones;
 
 use crate::RobotSettings;
@@ -86,6 +87,8 @@ pub(crate) struct CollisionMonitor {
     /// Camera of the frames.
     depth: DepthState,
     depth_age: Freshness,
+    /// Watch over the colour or grey image, by which people are detected and known again.
+    picture: Watch<NoReference>,
     /// Scanner of the frames.
     laser: ScanState,
     laser_age: Freshness,
@@ -104,6 +107,7 @@ impl CollisionMonitor {
         Self {
             depth: DepthState::new(footprint.clone()),
             depth_age: Freshness::default(),
+            picture: Watch::default(),
             laser: ScanState::default(),
             laser_age: Freshness::default(),
             further_lasers: Vec::new(),
@@ -136,6 +140,7 @@ impl CollisionMonitor {
     /// Forgets that a sensor was frozen, after a person has checked the robot.
     pub(crate) fn arm(&mut self) {
         self.depth.arm();
+        self.picture = Watch::default();
         self.laser.arm();
         for (laser, _) in &mut self.further_lasers {
             laser.arm();
@@ -155,6 +160,7 @@ impl CollisionMonitor {
     ) {
         let target = tracks.iter().find(|track| Some(track.id) == followed);
         self.update_depth(frame, motion, tracks, target);
+        self.picture.add_picture(&frame.images());
         self.update_laser(frame, motion, tracks);
         let readings = frame.sensor::<ObstacleReadings>();
         let readings = readings.map_or(&[][..], |readings| &readings.0);
@@ -191,6 +197,9 @@ impl CollisionMonitor {
         let taken = frame.sensor::<CameraImage<DepthImage>>().ok();
         // A frame is made of its images, so that each of them is new with it.
         self.depth_age.update(taken.map(|_| (frame.stamp, 0.0)), motion.dt);
+        if frame.expected.uses(Input::Depth) {
+            self.depth_age.expect();
+        }
         let image = taken.map(|taken| (&*frame.camera, &taken.image));
         self.depth.update(&self.settings, image, motion, tracks, target);
         if taken.is_some()
@@ -208,6 +217,9 @@ impl CollisionMonitor {
         // A scan of after its frame is as new as it can be.
         let stamped = stamp.map(|stamp| (stamp, frame.stamp.seconds_since(stamp).max(0.0)));
         let is_new = self.laser_age.update(stamped, motion.dt);
+        if frame.expected.uses(Input::Laser) {
+            self.laser_age.expect();
+        }
         self.laser.update(&self.settings, scan.filter(|_| is_new), motion, tracks);
         self.update_further_lasers(frame, motion, tracks);
     }
@@ -223,6 +235,8 @@ impl CollisionMonitor {
             let stamp = scan.map(|scan| scan.stamp.unwrap_or(frame.stamp));
             let stamped = stamp.map(|stamp| (stamp, frame.stamp.seconds_since(stamp).max(0.0)));
             let is_new = age.update(stamped, motion.dt);
+            // The source of the frames names each scanner that it reads.
+            age.expect();
             laser.update(&self.settings, scan.filter(|_| is_new), motion, tracks);
         }
     }
@@ -274,7 +288,8 @@ impl CollisionMonitor {
 
     /// Returns true if the images are frozen and show an earlier time now.
     pub(crate) fn shows_past(&self) -> bool {
-        self.depth.shows_past(self.most_identical())
+        let most = self.most_identical();
+        self.depth.shows_past(most) || self.picture.shows_past(most)
     }
 
     /// Returns the number of identical readings from which on a sensor is frozen; 0 for none.
@@ -287,6 +302,9 @@ impl CollisionMonitor {
     fn first_frozen(&self, most: u32) -> Option<String> {
         if self.depth.is_frozen(most) {
             return Some("the depth image".to_owned());
+        }
+        if self.picture.is_frozen(most) {
+            return Some("the colour image".to_owned());
         }
         if self.laser.is_frozen(most) {
             return Some("the laser scanner".to_owned());
@@ -316,7 +334,8 @@ impl CollisionMonitor {
         Some((self.settings.slowdown_ratio, self.zones.slowdown_reason()?))
     }
 
-    /// Returns true if a sensor that once delivered, or a configured source, is silent.
+    /// Returns true if a sensor that once delivered or is expected to, or a configured source, is
+    /// silent.
     fn is_silent(&self, patience_s: f64) -> bool {
         self.depth_age.is_silent(patience_s)
             || self.laser_age.is_silent(patience_s)
@@ -327,8 +346,8 @@ impl CollisionMonitor {
     /// Returns true if the frame has depth or a scan, or a source sees obstacles.
     fn has_eyes(&self) -> bool {
         self.depth_age.delivers()
-            || self.laser_age.delivers()
-            || self.further_lasers.iter().any(|(_, age)| age.delivers())
+            || self.laser_age.delivers() && self.laser.is_eye()
+            || self.further_lasers.iter().any(|(laser, age)| age.delivers() && laser.is_eye())
             || self.sources.iter().any(FurtherSource::is_eye)
     }
 

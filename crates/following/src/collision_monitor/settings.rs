@@ -79,9 +79,9 @@ settings! {
         /// or "free" for a scanner that misses nothing within its range, used alone in rooms larger
         /// than its range.
         pub no_return: NoReturn = NoReturn::Unknown,
-        /// Number of consecutive new depth images or scans that equal the one before, after which
-        /// the sensor counts as frozen, because real sensors have noise. An image or scan that is
-        /// in several frames is new once.
+        /// Number of consecutive new depth images, colour images or scans that equal the one before,
+        /// after which the sensor counts as frozen, because real sensors have noise. An image or
+        /// scan that is in several frames is new once.
         #[schemars(range(min = 2, max = 100))]
         pub identical_frames: u32 = 4,
         /// The sensors are simulated without noise: equal images do not count as frozen.

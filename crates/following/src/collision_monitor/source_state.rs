@@ -4,7 +4,7 @@ use nalgebra::{Point2, Point3, Vector3};
 use tagalong_core::{EgoMotion, LaserScan, RangeReading, RayReading, Track};
 
 use super::binned::BinnedHazards;
-use super::coverage::{Coverage, Look};
+use super::coverage::{Coverage, FREE_M, Look, passes_way};
 use super::space::SpaceGrid;
 use super::sweep::{Hazard, HazardKind};
 use super::watchdog::{ScanReference, Watch};
@@ -17,8 +17,6 @@ const RANGE_M: f64 = 2.0;
 const BEFORE_FOOTPRINT_M: [f64; 3] = [0.1, 0.2, 0.3];
 /// Places on the arc of a range sensor.
 const ON_ARC: usize = 9;
-/// Length of the way that a ray without a reflection keeps free, m, where that means free.
-const FREE_M: f64 = 6.0;
 /// Height by which a reflection may be below a level scanner, m: no mount is quite level.
 const LEVEL_M: f64 = 0.03;
 
@@ -80,7 +78,9 @@ impl ScanState {
             }
         }
         let eye: Point2<f64> = scan.robot_from_scanner.translation.vector.xy().into();
-        let silent = scan.unread.iter().filter(|unread| unread.reading == RayReading::NoReturn);
+        let silent = scan.unread.iter().filter(|unread| {
+            unread.reading == RayReading::NoReturn && passes_way(settings, scan, unread.ray)
+        });
         let passed = silent.map(|unread| scan.place(unread.ray, FREE_M).xy());
         let ends = self.points.iter().copied().chain(passed);
         self.space.add(eye, self.points.iter().copied(), ends);
@@ -105,6 +105,11 @@ impl ScanState {
     /// Returns the directions in which the scanner sees something, if it ever delivered.
     pub(super) fn coverage(&self, min_share: f64) -> Option<Coverage> {
         self.coverage.clone().map(|coverage| coverage.with_min_share(min_share))
+    }
+
+    /// Returns true for a scanner that sees the way, not one of which all rays run above it.
+    pub(super) fn is_eye(&self) -> bool {
+        self.coverage.as_ref().is_some_and(Coverage::looks)
     }
 }
 

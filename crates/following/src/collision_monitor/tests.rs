@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector2, Vector3};
 use tagalong_conformance::target;
-use tagalong_core::{DepthImage, LaserScan};
+use tagalong_core::{DepthImage, FurtherScans, Inputs, LaserScan, RgbImage};
 use tagalong_core::{Images, ObstacleData, ObstacleReading, RangeReading, RayReading, Stamp};
 use tagalong_geometry::{Camera, Distortion, Pinhole};
 

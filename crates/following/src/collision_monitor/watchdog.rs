@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry2, Isometry3, Point2, Point3};
-use tagalong_core::{DepthImage, EgoMotion, LaserScan, Track, spatial_pose};
+use tagalong_core::{DepthImage, EgoMotion, Image, Images, LaserScan, Track, spatial_pose};
 use tagalong_geometry::Camera;
 
 /// Pixels of a depth image that are compared, at most, in each direction.
@@ -139,6 +139,37 @@ impl<R> Watch<R> {
     }
 }
 
+/// Reference of a colour image: none, for only repetition is looked for.
+pub(super) struct NoReference;
+
+impl Watch<NoReference> {
+    /// Takes in the colour or grey image of a frame. One of a single value, as in the dark, has no
+    /// noise by which it could be told from the next one, and shows no person either.
+    pub(super) fn add_picture(&mut self, images: &Images) {
+        let pixels = if let Some(colour) = &images.colour {
+            sampled(colour, |[red, green, blue]| u32::from_be_bytes([0, red, green, blue]))
+        } else if let Some(grey) = &images.grey {
+            sampled(grey, u32::from)
+        } else {
+            return;
+        };
+        if pixels.iter().all(|pixel| Some(pixel) == pixels.first()) {
+            self.previous.clear();
+            self.repeated = 0;
+            return;
+        }
+        self.compare_bits(pixels.into_iter());
+    }
+}
+
+/// Returns the pixels of an image on a grid.
+fn sampled<P: Copy>(image: &Image<P>, bits: impl Fn(P) -> u32 + Copy) -> Vec<u32> {
+    let step_x = image.width().div_ceil(GRID).max(1);
+    let step_y = image.height().div_ceil(GRID).max(1);
+    let rows = (0..image.height()).step_by(step_y).map(|y| image.row(y));
+    rows.flat_map(|row| row.iter().step_by(step_x).map(|pixel| bits(*pixel))).collect()
+}
+
 /// Depth image of a reference.
 pub(super) struct DepthReference {
     depth: Arc<DepthImage>,
@@ -151,10 +182,7 @@ impl Watch<DepthReference> {
     pub(super) fn add_depth(&mut self, camera: &Camera, depth: &Arc<DepthImage>, tracks: &[Track]) {
         let step_x = depth.width().div_ceil(GRID).max(1);
         let step_y = depth.height().div_ceil(GRID).max(1);
-        let sampled = (0..depth.height())
-            .step_by(step_y)
-            .flat_map(|y| depth.row(y).iter().step_by(step_x).map(|z| z.to_bits()));
-        self.compare_bits(sampled);
+        self.compare_bits(sampled(depth, f32::to_bits).into_iter());
         let moved = self.moved();
         if self.reference.is_some() && moved.is_none() {
             return;

@@ -20,11 +20,15 @@ use std::time::{Duration, Instant};
 
 use ramp::{Axis, AxisLimits};
 use response::{Response, ResponseCheck};
-use tagalong_core::{Command, DiffDrive, Frame, Reason, Stamp, Twist, WheelSpeeds};
+use tagalong_core::{
+    Command, DiffDrive, Frame, MAX_CAMERA_POSE_AGE_S, Reason, Stamp, Twist, WheelSpeeds,
+};
 
 use crate::collision_monitor::{Allowance, Braking, Path};
 use crate::{Base, OdometrySource, RobotSettings};
 
+/// Delay of the wheels, in reaction times, beyond which it is a fault.
+const LATEST: f64 = 2.0;
 /// Longest time over which the robot may have changed its speed, s. A pause of frames must not
 /// allow a large step of the speed.
 const LONGEST_STEP_S: f64 = 0.2;
@@ -240,13 +244,16 @@ impl CommandLimiter {
         }
     }
 
-    /// Judges the odometry of a frame, and how late images and wheels are. Latches a fault if the
+    /// Judges the odometry of a frame, the pose of its camera, and how late images and wheels are. Latches a fault if the
     /// odometry moved faster than the robot can, or the robot does not move as it was commanded.
     pub(crate) fn check_motion(&mut self, frame: &Frame) {
         let motion = &frame.motion;
         let travel = motion.forward.hypot(motion.left);
         // At least 50 ms: over a shorter time, small odometry errors would look like high speeds.
-        if travel > self.settings.max_odometry_mps * motion.dt.max(0.05) {
+        let dt_s = motion.dt.max(0.05);
+        let is_too_far = travel > self.settings.max_odometry_mps * dt_s;
+        let is_turned = motion.turn.abs() > self.settings.max_odometry_radps * dt_s;
+        if is_too_far || motion.turn.is_finite() && is_turned {
             self.latch("odometry jumped");
         }
         self.late = None;
@@ -259,6 +266,10 @@ impl CommandLimiter {
             }
             self.is_odometry_old = frame.odometry_age_s > self.settings.slow_after_s;
         }
+        let is_placed = frame.camera_pose_age_s <= MAX_CAMERA_POSE_AGE_S;
+        if !is_placed {
+            self.late = self.late.or(Some(Reason::CameraPose));
+        }
         let image_s = frame.latency_s.unwrap_or(0.0);
         let is_in_time = image_s <= self.settings.reaction_s;
         if !is_in_time {
@@ -270,7 +281,7 @@ impl CommandLimiter {
                 let answered_s =
                     if wheels_s > 0.0 { image_s + motion.dt + wheels_s } else { image_s };
                 self.reaction_s = self.settings.reaction_s.max(answered_s);
-                if wheels_s > 2.0 * self.settings.reaction_s {
+                if wheels_s > LATEST * self.settings.reaction_s {
                     self.latch("the base responds too late to its commands");
                 }
             }
@@ -319,7 +330,7 @@ impl CommandLimiter {
         self.last = None;
         self.is_withdrawn = false;
         self.motion = Motion::default();
-        self.response.clear();
+        self.response.arm(LATEST * self.settings.reaction_s);
     }
 
     /// Returns the reason for an emergency stop, if there is one: the wheels stop at once.

@@ -80,9 +80,18 @@ impl ResponseCheck {
         self.is_driving = is_driving;
     }
 
-    /// Forgets the commands.
+    /// Forgets the commands, but not how late the wheels respond: they do so too after a pause, or
+    /// when the enable is pressed again.
     pub(super) fn clear(&mut self) {
-        *self = Self { is_driving: self.is_driving, ..Self::default() };
+        let delays = std::mem::take(&mut self.delays);
+        *self = Self { is_driving: self.is_driving, delays, ..Self::default() };
+    }
+
+    /// Forgets all but the delays up to `most_s`, after a person has checked the robot: a longer one
+    /// was a fault, and would be one again at once.
+    pub(super) fn arm(&mut self, most_s: f64) {
+        self.clear();
+        self.delays.retain(|(_, delay_s)| *delay_s <= most_s);
     }
 
     /// Ends the newest command: the base was told to stop then.
@@ -232,8 +241,14 @@ impl ResponseCheck {
         error
     }
 
-    /// Returns the largest delay that was measured lately, s.
+    /// Returns the largest delay that was measured lately, s. Time in which the base does not execute
+    /// the commands does not count, nor that of another clock.
     fn largest_delay_s(&mut self, now: Stamp) -> f64 {
+        for (at, _) in &mut self.delays {
+            if !self.is_driving || *at > now {
+                *at = now;
+            }
+        }
         while self.delays.front().is_some_and(|(at, _)| now.seconds_since(*at) > RECENT_S) {
             self.delays.pop_front();
         }
@@ -331,6 +346,50 @@ mod tests {
                 "{frames} frames: {found_s}"
             );
         }
+    }
+
+    /// Each press of the enable begins the comparison anew; the wheels are as late as before.
+    #[test]
+    fn a_delay_outlasts_a_pause_and_a_reset() {
+        let mut check = ResponseCheck::default();
+        check.set_driving(true);
+        let drove = late(12);
+        for frame in 0..300 {
+            let motion = EgoMotion { forward: drove(frame) * DT_S, ..EgoMotion::at_rest(DT_S) };
+            check.update(stamp(frame), &motion);
+            let at = stamp(frame);
+            let twist = Twist::new(stop_and_go(frame), 0.0);
+            let until = at.plus_seconds(0.25);
+            check.add(&Command::new(twist, WheelSpeeds::STOP, at, until, Reason::Follow));
+        }
+        let Response::Within(measured_s) = check.update(stamp(300), &EgoMotion::at_rest(DT_S))
+        else {
+            panic!("it obeys")
+        };
+        assert!(measured_s > 0.4, "{measured_s}");
+        check.set_driving(false);
+        for frame in 301..900 {
+            let waiting = check.update(stamp(frame), &EgoMotion::at_rest(DT_S));
+            assert_eq!(waiting, Response::Within(measured_s), "{frame}");
+        }
+        check.set_driving(true);
+        let again = check.update(stamp(900), &EgoMotion::at_rest(DT_S));
+        assert_eq!(again, Response::Within(measured_s));
+        let before = check.update(stamp(500), &EgoMotion::at_rest(DT_S));
+        assert_eq!(before, Response::Within(measured_s), "after a step of the clock");
+        check.arm(1.0);
+        let reset = check.update(stamp(501), &EgoMotion::at_rest(DT_S));
+        assert_eq!(reset, Response::Within(measured_s), "after a reset");
+        let later = check.update(stamp(501 + 170), &EgoMotion::at_rest(DT_S));
+        assert_eq!(later, Response::Within(0.0), "ten seconds of driving later");
+    }
+
+    #[test]
+    fn what_made_the_base_a_fault_is_forgotten_by_the_reset() {
+        let mut check = ResponseCheck { is_driving: true, ..ResponseCheck::default() };
+        check.delays.extend([(stamp(0), 0.6), (stamp(1), 1.2)]);
+        check.arm(1.0);
+        assert_eq!(check.update(stamp(2), &EgoMotion::at_rest(DT_S)), Response::Within(0.6));
     }
 
     #[test]

@@ -53,6 +53,10 @@ settings! {
         /// is armed again.
         #[schemars(range(min = 0.1, max = 5.0))]
         pub max_odometry_mps: f64 = 3.0,
+        /// Largest plausible turn rate of the odometry, rad/s, as `max_odometry_mps`: about one turn
+        /// a second, which no mobile robot reaches.
+        #[schemars(range(min = 0.5, max = 12.0))]
+        pub max_odometry_radps: f64 = 6.3,
         /// Compares the odometry with the commands while the base executes them: a base that does
         /// something else, or responds too late, is a fault. Turn it off only if the odometry is
         /// not that of the base, as in a test with a recorded drive.
@@ -102,7 +106,9 @@ impl CommandLimiterSettings {
         at_least("stop_after_s", self.stop_after_s, "slow_after_s", self.slow_after_s)?;
         at_least("max_decel_mps2", self.max_decel_mps2, "max_accel_mps2", self.max_accel_mps2)?;
         let speed = ("max_speed_mps", robot.max_speed_mps);
-        at_least("max_odometry_mps", self.max_odometry_mps, speed.0, speed.1)
+        at_least("max_odometry_mps", self.max_odometry_mps, speed.0, speed.1)?;
+        let turn = ("max_turn_radps", self.max_turn_radps);
+        at_least("max_odometry_radps", self.max_odometry_radps, turn.0, turn.1)
     }
 }
 

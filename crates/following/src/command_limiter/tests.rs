@@ -389,6 +389,18 @@ fn a_jump_of_odometry_lasts_until_armed() {
 }
 
 #[test]
+fn a_turn_faster_than_any_robot_is_a_jump_of_odometry() {
+    for (turn_rad, dt_s, is_jump) in
+        [(0.64, 0.1, true), (-3.0, 0.1, true), (0.62, 0.1, false), (0.3, 0.01, false)]
+    {
+        let (mut limiter, _) = at_speed(0.5, 0.5);
+        limiter.check_motion(&moved(EgoMotion { turn: turn_rad, ..EgoMotion::at_rest(dt_s) }));
+        let fault = is_jump.then_some("odometry jumped");
+        assert_eq!(limiter.fault(), fault, "{turn_rad} rad in {dt_s} s");
+    }
+}
+
+#[test]
 fn stopping_takes_what_physics_says() {
     let settings = CommandLimiterSettings { margin_m: 0.0, ..CommandLimiterSettings::default() };
     assert!((settings.stopping_m(0.9) - 0.945).abs() < 1e-9, "with the rise of the deceleration");
@@ -485,6 +497,11 @@ fn odometry_that_is_old_or_no_number_and_late_images_stop() {
     for broken in [f64::NAN, f64::NEG_INFINITY] {
         let turned = moved(EgoMotion { turn: broken, ..EgoMotion::at_rest(0.1) });
         assert_eq!(reason(turned), (Reason::Odometry, true));
+    }
+    assert_eq!(reason(still().with_camera_pose_age(1.4)), (Reason::Follow, false));
+    for age_s in [1.6, f64::INFINITY, f64::NAN] {
+        let frame = still().with_camera_pose_age(age_s);
+        assert_eq!(reason(frame), (Reason::CameraPose, true), "{age_s}");
     }
     assert_eq!(reason(still().with_latency(Some(0.2))), (Reason::Follow, false));
     for latency_s in [0.51, f64::NAN] {

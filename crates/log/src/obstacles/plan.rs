@@ -19,6 +19,15 @@ pub(crate) struct PlannedSource {
     pub(crate) schema: String,
     /// Lens of a depth camera.
     pub(super) lens: Option<Intrinsics>,
+    /// Topic of the calibration of a depth camera.
+    pub(crate) info_topic: Option<String>,
+}
+
+impl PlannedSource {
+    /// Returns true for the topic of the source, and that of its calibration.
+    pub(crate) fn has(&self, topic: &str) -> bool {
+        self.topic.topic == topic || self.info_topic.as_deref() == Some(topic)
+    }
 }
 
 impl ObstacleKind {
@@ -92,9 +101,13 @@ fn planned_source(scan: &Scan, source: &ObstacleTopic) -> Result<Planned, LogErr
         let wanted = format!("message of source `{name}` on {topic}");
         return Ok(Planned::Lacks { wanted, remedy: alternatives(scan, *kind) });
     };
-    let lens = match kind {
-        ObstacleKind::Depth => lens_of(scan, source)?,
+    let info_topic = match kind {
+        ObstacleKind::Depth => info_topic_of(scan, source),
         ObstacleKind::Scan | ObstacleKind::Range | ObstacleKind::Bumper => None,
+    };
+    let lens = match &info_topic {
+        Some(info_topic) => lens_of(scan, source, info_topic)?,
+        None => None,
     };
     if *kind == ObstacleKind::Depth && lens.is_none() {
         let wanted = format!("calibration (sensor_msgs/CameraInfo) of source `{name}` on {topic}");
@@ -102,7 +115,7 @@ fn planned_source(scan: &Scan, source: &ObstacleTopic) -> Result<Planned, LogErr
         return Ok(Planned::Lacks { wanted, remedy });
     }
     let schema = found.schema.clone();
-    Ok(Planned::Found(Box::new(PlannedSource { topic: source.clone(), schema, lens })))
+    Ok(Planned::Found(Box::new(PlannedSource { topic: source.clone(), schema, lens, info_topic })))
 }
 
 /// Returns true for a bumper whose silence means that it is not pressed.
@@ -123,17 +136,22 @@ fn alternatives(scan: &Scan, kind: ObstacleKind) -> String {
     }
 }
 
-/// Returns the lens of a depth camera; `None` without a calibration.
-fn lens_of(scan: &Scan, source: &ObstacleTopic) -> Result<Option<Intrinsics>, LogError> {
+/// Returns the topic of the calibration of a depth camera: the one that the settings name, or the one
+/// beside its images.
+fn info_topic_of(scan: &Scan, source: &ObstacleTopic) -> Option<String> {
     let named = source.info_topic.clone();
-    let Some(topic) =
-        named.or_else(|| calibration_of(scan, &source.topic, false).map(|it| it.topic))
-    else {
-        return Ok(None);
-    };
-    let Some(info) = scan.infos.get(&topic) else { return Ok(None) };
+    named.or_else(|| calibration_of(scan, &source.topic, false).map(|it| it.topic))
+}
+
+/// Returns the lens of a depth camera; `None` without a calibration on this topic.
+fn lens_of(
+    scan: &Scan,
+    source: &ObstacleTopic,
+    info_topic: &str,
+) -> Result<Option<Intrinsics>, LogError> {
+    let Some(info) = scan.infos.get(info_topic) else { return Ok(None) };
     // The topic name is the only indication that images are rectified.
-    intrinsics(info, source.topic.contains("rect"))
-        .map(Some)
-        .map_err(|source| LogError::Calibration { path: scan.path.clone(), topic, source })
+    intrinsics(info, source.topic.contains("rect")).map(Some).map_err(|source| {
+        LogError::Calibration { path: scan.path.clone(), topic: info_topic.to_owned(), source }
+    })
 }

@@ -64,7 +64,7 @@ impl ObstacleReader {
     /// images take time to process. A log is read ahead, so only readings before the frame count.
     pub(crate) fn new(planned: &PlannedSource, is_live: bool) -> Option<Self> {
         let later_s = if is_live { AHEAD_S } else { 0.0 };
-        let PlannedSource { topic: source, schema, lens } = planned;
+        let PlannedSource { topic: source, schema, lens, .. } = planned;
         let messages = match source.kind {
             ObstacleKind::Scan => Messages::Scan(Readings::default()),
             ObstacleKind::Range => Messages::Range(Readings::default()),
@@ -83,6 +83,20 @@ impl ObstacleReader {
     /// Returns the topic of the source.
     pub(crate) fn topic(&self) -> &str {
         &self.source.topic
+    }
+
+    /// Returns the frame id whose pose in tf the newest reading has; `None` if the settings give the
+    /// pose, or before the first reading.
+    pub(crate) fn mount_frame(&self) -> Option<&str> {
+        if self.source.mount.is_some() {
+            return None;
+        }
+        match &self.messages {
+            Messages::Scan(scans) => scans.newest().map(|scan| scan.header.frame_id.as_str()),
+            Messages::Range(ranges) => ranges.newest().map(|range| range.header.frame_id.as_str()),
+            Messages::Depth(depth) => depth.images.newest().map(|image| image.frame_id.as_str()),
+            Messages::Bumper(_) => None,
+        }
     }
 
     /// Adds a message. If it has no stamp of its own, its arrival is the stamp.

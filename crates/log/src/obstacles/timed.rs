@@ -76,6 +76,11 @@ impl<T> Readings<T> {
         self.readings.front().filter(|_| count > 0)
     }
 
+    /// Returns the newest reading.
+    pub(super) fn newest(&self) -> Option<&T> {
+        self.readings.back().map(|reading| &reading.value)
+    }
+
     /// Returns the stamp of the first reading.
     pub(super) fn first_stamp(&self) -> Option<Stamp> {
         self.readings.front().map(|reading| reading.stamp)

@@ -68,6 +68,14 @@ impl SensorReader for Scans {
         self.near += u64::from(self.recent.near(stamp).is_some());
     }
 
+    fn set_aside(&mut self, _: Stamp) {
+        self.recent.set_aside();
+    }
+
+    fn restore(&mut self) {
+        self.recent.restore();
+    }
+
     fn add_to(&self, sensors: Sensors, moment: &Moment<'_>, tally: &mut Tally) -> Sensors {
         let seen = self.seen(moment, tally);
         if self.is_further {

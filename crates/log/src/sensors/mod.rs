@@ -84,7 +84,8 @@ pub(crate) trait SensorReader: Send + Sync {
     }
 
     /// Sets the messages from before `newest` aside for [`SensorReader::restore`], because the
-    /// clock has jumped back.
+    /// clock has jumped back. A sensor without an order of its own notes the jump, and drops what
+    /// came before it then.
     fn set_aside(&mut self, newest: Stamp) {
         let _ = newest;
     }

@@ -1,7 +1,7 @@
 //! Points of 3-D lidars: the cloud nearest in time to an image, or frames of their own.
 
 use nalgebra::{Isometry2, Isometry3, Point3};
-use tagalong_core::{Input, PointCloud as Cloud, Sensors, spatial_pose};
+use tagalong_core::{Input, PointCloud as Cloud, Sensors, Stamp, spatial_pose};
 
 use super::recent::Recent;
 use super::{Moment, SensorReader, SensorType};
@@ -41,6 +41,14 @@ impl SensorReader for Clouds {
     fn take(&mut self, message: &Message<'_>, _: &mut Tally) -> Result<(), CdrError> {
         self.0.push(Payload::of_headed(message)?);
         Ok(())
+    }
+
+    fn set_aside(&mut self, _: Stamp) {
+        self.0.set_aside();
+    }
+
+    fn restore(&mut self) {
+        self.0.restore();
     }
 
     fn add_to(&self, sensors: Sensors, moment: &Moment<'_>, tally: &mut Tally) -> Sensors {

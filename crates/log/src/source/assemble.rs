@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry2, Isometry3};
 use tagalong_core::{
-    DepthImage, EgoMotion, Frame, Images, Input, MAX_ODOMETRY_GAP_S, ObstacleReadings, RightImage,
-    Sensors, Stamp, planar_pose,
+    DepthImage, EgoMotion, Frame, Images, Input, MAX_CAMERA_POSE_AGE_S, MAX_ODOMETRY_GAP_S,
+    ObstacleReadings, RightImage, Sensors, Stamp, planar_pose,
 };
 use tagalong_geometry::{Camera, ConicalMirror, Lens, Panorama, Pinhole};
 use tagalong_vision::Unwrapping;
@@ -255,8 +255,8 @@ impl Assembler {
             if known.is_some() && !self.is_hold_told {
                 self.is_hold_told = true;
                 tally.note(format!(
-                    "{} has no pose of the camera at some frames, which get the last known one: \
-                     publish it on /tf_static if the camera does not move on the robot, otherwise \
+                    "{} has no pose of the camera at some frames, which get the last known one, \
+                     and after {MAX_CAMERA_POSE_AGE_S} s a robot that is steered stands: publish it on /tf_static if the camera does not move on the robot, otherwise \
                      throughout the log",
                     plan.mount.source()
                 ));
@@ -367,7 +367,9 @@ impl Assembler {
             frame: Frame::of_sensors(self.index, stamp, camera, motion, sensors)
                 .with_changed_calibration(intake.watch.has_changed(stamp))
                 .with_odometry_age(odometry_age_s(plan, stamp, intake))
-                .with_odometry_jump(odom_jumped),
+                .with_odometry_jump(odom_jumped)
+                .with_camera_pose_age(plan.mount.age_s(&intake.tf, stamp))
+                .with_expected(plan.expected()),
             odom_from_robot: here.pose,
             odom_stale: here.stale || !known,
         }
@@ -410,7 +412,7 @@ impl Assembler {
             && self.previous.is_some_and(|(then, _)| intake.poses.jumped_between(then, stamp));
         if jumped {
             tally.count("odometry_jump_frames");
-            tally.note("odometry jumps by more than a metre at some frames");
+            tally.note("odometry jumps by more than a metre, or a quarter turn, at some frames");
         }
         jumped
     }

@@ -45,6 +45,11 @@ impl Assembly {
         }
     }
 
+    /// Returns the topic of the first calibration that changed.
+    pub(super) fn changed_calibration(&self) -> Option<&str> {
+        self.intake.watch.changed_info()
+    }
+
     /// Returns true for topics with messages that are used.
     pub(super) fn reads(&self, channel: &Channel) -> bool {
         Type::of(&channel.schema_name) == Type::Tf || self.plan.reads(&channel.topic)
@@ -70,6 +75,8 @@ impl Assembly {
 
     /// Returns the next frame, which no later message can change.
     fn next_frame(&mut self) -> Option<LogFrame> {
+        // No frame of the new time may take the messages of the time before a jump of the clock.
+        self.intake.settle();
         while let Some((image, next)) = self.intake.frames.pop(self.ended) {
             let plan = &self.plan;
             let intake = &mut self.intake;
@@ -137,6 +144,7 @@ impl Assembly {
             let (popped, skipped) = intake.pop_newest(plan);
             self.tally.add("frames_skipped", skipped);
             let (image, next) = popped?;
+            intake.settle();
             let frame = self.assembler.assemble(plan, &image, next, intake, &mut self.tally);
             self.intake.settle();
             if frame.is_some() {

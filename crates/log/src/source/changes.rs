@@ -22,16 +22,21 @@ const CONSEQUENCE: &str = "the first one is used throughout, and from the change
                            where they were";
 
 /// Watches everything that must not change during a run: the calibrations of the cameras, the frame
-/// ids of the images, and the mounts in the static transforms.
+/// ids of the images, and the mounts in the static transforms, also those of further sensors.
 pub(super) struct CameraWatch {
     /// First calibrations, by topic.
     infos: BTreeMap<String, CameraInfo>,
+    /// Topic of the first calibration that changed.
+    changed_info: Option<String>,
     mounts: Vec<WatchedMount>,
+    /// Frame of the robot.
+    robot_frame: String,
     /// Time of the first change.
     changed_at: Option<Stamp>,
 }
 
 /// Pose of a sensor that is given by static transforms, wholly or in part.
+#[derive(PartialEq)]
 struct WatchedMount {
     target: String,
     source: String,
@@ -41,12 +46,20 @@ impl CameraWatch {
     pub(super) fn new(plan: &Plan) -> Self {
         let chosen = &plan.chosen;
         let topics = [&chosen.colour_info, &chosen.depth_info, &chosen.right_info];
+        let further = plan.sources.iter().map(|source| &source.info_topic);
         let infos = topics
             .into_iter()
+            .chain(further)
             .flatten()
             .filter_map(|topic| Some((topic.clone(), plan.scan.infos.get(topic)?.clone())))
             .collect();
-        Self { infos, mounts: watched_mounts(plan), changed_at: None }
+        Self {
+            infos,
+            changed_info: None,
+            mounts: watched_mounts(plan),
+            robot_frame: robot_frame(&plan.scan, &plan.input).to_owned(),
+            changed_at: None,
+        }
     }
 
     /// Returns true for the topic of a watched calibration.
@@ -66,6 +79,7 @@ impl CameraWatch {
         });
         if changed {
             self.change_at(info.header.stamp());
+            self.changed_info.get_or_insert_with(|| topic.to_owned());
             tally.lose("camera_info_changes", || {
                 format!("{topic}: the calibration changes on the way; {CONSEQUENCE}")
             });
@@ -93,6 +107,19 @@ impl CameraWatch {
                 image.frame_id, image.stamp
             )
         });
+    }
+
+    /// Returns the topic of the first calibration that changed.
+    pub(super) fn changed_info(&self) -> Option<&str> {
+        self.changed_info.as_deref()
+    }
+
+    /// Watches the mount of one more sensor on the robot, by its frame id.
+    pub(super) fn watch_sensor(&mut self, frame: &str) {
+        let mount = WatchedMount { target: self.robot_frame.clone(), source: frame.to_owned() };
+        if mount.target != mount.source && !self.mounts.contains(&mount) {
+            self.mounts.push(mount);
+        }
     }
 
     /// Returns the static parts of the watched mounts, in order.
@@ -149,22 +176,21 @@ impl CameraWatch {
 }
 
 /// Returns the poses on which the frames depend: of the camera on the robot, of the depth camera
-/// relative to the colour camera, and of the laser scanner on the robot.
+/// relative to the colour camera, and of the laser scanners on the robot.
 fn watched_mounts(plan: &Plan) -> Vec<WatchedMount> {
     let primary = plan.scan.frame_of(plan.primary());
     let depth = plan.chosen.depth.as_ref().and_then(|topic| plan.scan.frame_of(topic));
     let laser = plan.chosen.sensor(Input::Laser).filter(|topic| *topic != plan.primary());
-    let laser = laser.and_then(|topic| plan.scan.frame_of(topic));
+    let further = plan.chosen.further_scans.iter().map(String::as_str);
+    let scanners = laser.into_iter().chain(further).filter_map(|topic| plan.scan.frame_of(topic));
+    let robot = robot_frame(&plan.scan, &plan.input);
     let camera = match &plan.mount {
         Mount::Tf { base, camera } => Some((base.as_str(), camera.as_str())),
         Mount::Fixed { .. } => None,
     };
-    let pairs = [
-        camera,
-        primary.zip(depth),
-        laser.map(|laser| (robot_frame(&plan.scan, &plan.input), laser)),
-    ];
-    let pairs = pairs.into_iter().flatten().filter(|(target, source)| target != source);
+    let cameras = [camera, primary.zip(depth)].into_iter().flatten();
+    let pairs = cameras.chain(scanners.map(|scanner| (robot, scanner)));
+    let pairs = pairs.filter(|(target, source)| target != source);
     pairs
         .map(|(target, source)| WatchedMount {
             target: target.to_owned(),

@@ -260,8 +260,11 @@ impl Intake {
         }
     }
 
-    /// Adds static transforms during the run; those that would move a camera are not used.
+    /// Adds static transforms during the run; those that would move a sensor are not used.
     fn take_static(&mut self, tf: &TFMessage, topic: &str, now: Stamp, tally: &mut Tally) {
+        for frame in self.obstacles.iter().filter_map(ObstacleReader::mount_frame) {
+            self.watch.watch_sensor(frame);
+        }
         let before = self.watch.mounts(&self.tf);
         let children = tf.transforms.iter().map(|transform| &transform.child_frame_id);
         let saved: Vec<_> = children.map(|child| self.tf.saved(child)).collect();

@@ -173,6 +173,11 @@ impl LiveSource {
         self.assembly.misfit().map(|misfit| self.assembly.plan.misfit(misfit.clone()))
     }
 
+    /// Returns the topic of the first calibration that changed on the way, if one did.
+    pub fn changed_calibration(&self) -> Option<&str> {
+        self.assembly.changed_calibration()
+    }
+
     /// Returns the numbers of skipped and lost images so far, by reason.
     pub fn counters(&self) -> &BTreeMap<&'static str, u64> {
         &self.assembly.tally.counters

@@ -82,6 +82,14 @@ impl Mount {
             Self::Fixed { pose, .. } => Some(*pose),
         }
     }
+
+    /// Returns the age of the pose at a given time, s; 0 if the camera does not move on the robot.
+    pub(super) fn age_s(&self, tf: &TfBuffer, stamp: Stamp) -> f64 {
+        match self {
+            Self::Tf { base, camera } => tf.pose_age_s(base, camera, stamp),
+            Self::Fixed { .. } => 0.0,
+        }
+    }
 }
 
 /// Returns the robot frame on the floor: `base_footprint` if tf has it and the settings do not name

@@ -61,7 +61,7 @@ impl Plan {
 
     /// Returns true for a topic whose messages are used.
     pub(super) fn reads(&self, topic: &str) -> bool {
-        self.chosen.has(topic) || self.sources.iter().any(|source| source.topic.topic == topic)
+        self.chosen.has(topic) || self.sources.iter().any(|source| source.has(topic))
     }
 
     /// Returns the topics of the further obstacle sources, keyed by the names of the sources.
@@ -97,6 +97,18 @@ impl Plan {
     /// Returns true if depth comes in addition to another image.
     pub(super) fn has_second_depth(&self) -> bool {
         self.chosen.colour.is_some() && self.chosen.depth.is_some()
+    }
+
+    /// Returns the inputs of obstacle sensors that are read besides what the frames are made of.
+    pub(super) fn expected(&self) -> Inputs {
+        let mut expected = Inputs::NONE;
+        if self.has_second_depth() {
+            expected = expected.accept(Input::Depth);
+        }
+        if self.chosen.sensor(Input::Laser).is_some() {
+            expected = expected.accept(Input::Laser);
+        }
+        expected
     }
 
     /// Returns true if the pixels of the images from which the frames are made are used, and not

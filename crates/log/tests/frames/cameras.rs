@@ -98,6 +98,7 @@ fn a_mount_that_is_set_right_before_the_first_image_is_no_change() {
     let (mut source, _saved) = open(log, Inputs::ANY);
     let found = frames(&mut source);
     assert!(changed(&found).is_empty());
+    assert!(found.iter().all(|found| found.frame.camera_pose_age_s == 0.0), "static");
     assert!((found[0].frame.camera.height_m() - 1.45).abs() < 1e-9);
 }
 
@@ -119,6 +120,7 @@ fn a_camera_on_a_joint_may_move() {
     let first = found[0].frame.camera.robot_from_camera;
     let last = found[9].frame.camera.robot_from_camera;
     assert!((first.rotation.angle_to(&last.rotation) - 0.45).abs() < 1e-6);
+    assert!(found.iter().all(|found| found.frame.camera_pose_age_s < 0.11));
     assert!(!source.data_lost(), "{:?}", source.notes());
 }
 
@@ -192,7 +194,11 @@ fn a_mount_that_is_on_tf_once_is_held_and_told() {
     log.moving("base_link", "colour", at(0.0), &level_pose());
     (0..20).for_each(|i| log.colour(at(f64::from(i) * 0.1)));
     let (mut source, _saved) = open(log, Inputs::ANY);
-    assert_eq!(frames(&mut source).len(), 20);
+    let found = frames(&mut source);
+    let ages: Vec<f64> = found.iter().map(|found| found.frame.camera_pose_age_s).collect();
+    assert_eq!(ages.len(), 20);
+    // A robot that is steered by the frames stops: the pose that is held is old.
+    assert!((ages[19] - 1.9).abs() < 1e-6 && ages[3] < 0.31, "{ages:?}");
     let held = count(&source, "frames_without_camera_pose");
     assert!((10..20).contains(&held), "{held}");
     let told = source.notes().iter().find(|note| note.contains("no pose of the camera")).unwrap();

@@ -212,6 +212,56 @@ fn a_second_scanner_is_read_beside_the_first() {
     }
 }
 
+/// A source that is not where it was is no less wrong than a camera of the frames that is not.
+#[test]
+fn c1_a_further_sensor_that_moves_in_tf_static_is_held_as_a_changed_calibration() {
+    for is_source in [true, false] {
+        let mut log = started();
+        log.fixed("base_link", "front", &Isometry3::translation(0.2, 0.0, 0.1));
+        log.fixed("base_link", "rear", &Isometry3::translation(-0.2, 0.0, 0.1));
+        for tick in 0..10 {
+            ride(&mut log, tick);
+            let t = 0.1 * f64::from(tick);
+            if tick == 5 {
+                log.fixed_at(at(t), "base_link", "rear", &Isometry3::translation(-0.2, 0.3, 0.1));
+            }
+            log.message("/a/scan", at(t), &scan_of("front", t, 3.0));
+            log.message("/b/scan", at(t), &scan_of("rear", t, 1.0));
+        }
+        let rear = source("rear", ObstacleKind::Scan, "/b/scan");
+        let sources = if is_source { vec![rear] } else { Vec::new() };
+        let (mut source, _saved) = open_with(log, &sources);
+        let found = frames(&mut source);
+        assert_eq!(found[0].frame.further_scans().len(), usize::from(!is_source));
+        let changed: Vec<bool> =
+            found.iter().map(|found| found.frame.calibration_changed).collect();
+        assert_eq!((changed[3], changed[9]), (false, true), "{is_source} {changed:?}");
+        let told = source.notes().join("\n");
+        assert!(told.contains("tf_static moves `rear` in `base_link`"), "{told}");
+    }
+}
+
+#[test]
+fn c1_a_further_camera_whose_calibration_changes_is_held_as_a_changed_calibration() {
+    let mut log = started();
+    for tick in 0..10 {
+        ride(&mut log, tick);
+        let t = 0.1 * f64::from(tick);
+        let info = info_of("rear", &camera(8, 6, if tick < 5 { 7.0 } else { 9.0 }));
+        let header = Header::new(at(t), "rear");
+        log.message("/rear/depth/camera_info", at(t), &CameraInfo { header, ..info });
+        rear_depth(&mut log, t, 1.5);
+    }
+    let mount = Some([-0.3, 0.0, 0.5, 0.0, 0.0, 180.0]);
+    let rear = source("rear", ObstacleKind::Depth, "/rear/depth/aligned");
+    let (mut source, _saved) = open_with(log, &[ObstacleTopic { mount, ..rear }]);
+    let found = frames(&mut source);
+    let changed: Vec<bool> = found.iter().map(|found| found.frame.calibration_changed).collect();
+    assert_eq!((changed[4], changed[9]), (false, true), "{changed:?}");
+    let told = source.notes().join("\n");
+    assert!(told.contains("/rear/depth/camera_info: the calibration changes"), "{told}");
+}
+
 /// Writes a depth image of a camera at the back.
 fn rear_depth(log: &mut LogWriter, t: f64, metres: f32) {
     let data: Vec<u8> = [metres; 8 * 6].iter().flat_map(|v| v.to_le_bytes()).collect();

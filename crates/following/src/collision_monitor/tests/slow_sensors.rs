@@ -188,6 +188,49 @@ fn a_sensor_that_contradicted_the_odometry_stays_frozen_until_the_robot_is_armed
     assert_eq!(same_picture(&mut monitor, 40..60, 0.0), None);
 }
 
+/// Returns the reason to stand after frames of depth that goes on, beside pictures whose grey value at
+/// one place is this one by the number of the frame; the rest has two values, or one.
+fn beside_picture(
+    monitor: &mut CollisionMonitor,
+    grey: impl Fn(usize) -> u8,
+    is_of_one_value: bool,
+) -> Option<Reason> {
+    for index in 0..6 {
+        let colour = RgbImage::from_fn(160, 120, |u, v| match (u, v) {
+            (40, 39) => [grey(index), 0, 9],
+            (80, _) if !is_of_one_value => [200, 0, 9],
+            _ => [grey(0), 0, 9],
+        });
+        let images = Images {
+            colour: Some(Arc::new(colour)),
+            depth: Some(Arc::new(depth_at(index, 0.0, 0.0))),
+            ..Images::default()
+        };
+        let stamp = Stamp::default().plus_seconds(index as f64 * 0.1);
+        let motion = EgoMotion::at_rest(0.1);
+        let frame = Frame::new(index as u64, stamp, Arc::new(camera()), motion, images);
+        monitor.update(&frame, &motion, &[], None);
+    }
+    monitor.stop_reason(0.5)
+}
+
+/// People are detected, verified and known again by colour: where it stands still, they are not where
+/// they seem to be, though depth goes on.
+#[test]
+fn the_same_colour_image_again_is_frozen_and_darkness_is_not() {
+    let mut frozen = monitor();
+    assert_eq!(beside_picture(&mut frozen, |_| 7, false), Some(Reason::Frozen));
+    assert_eq!(frozen.frozen_sensor(), Some(("the colour image".into(), false)));
+    assert!(frozen.shows_past());
+    assert_eq!(beside_picture(&mut monitor(), |index| index as u8, false), None, "with noise");
+    assert_eq!(beside_picture(&mut monitor(), |_| 0, true), None, "in the dark");
+    frozen.arm();
+    assert_eq!(frozen.frozen_sensor(), None);
+    let noiseless =
+        CollisionMonitorSettings { noiseless: true, ..CollisionMonitorSettings::default() };
+    assert_eq!(beside_picture(&mut monitor_of(noiseless), |_| 7, false), None, "as it is said");
+}
+
 /// The newest scan of before the jump says nothing of now, also where it comes again with each frame.
 #[test]
 fn after_a_jump_of_the_clock_a_scanner_is_silent_until_its_next_scan() {
@@ -207,4 +250,71 @@ fn after_a_jump_of_the_clock_a_scanner_is_silent_until_its_next_scan() {
     }
     let expected = [[None; 4], [Some(Reason::Silent); 4], [None; 4]].concat();
     assert_eq!(reasons, expected);
+}
+
+/// A topic that is announced or named, but on which nothing is ever published, is no free way.
+#[test]
+fn a_sensor_that_is_read_and_never_delivers_is_silent() {
+    for (expected, reason) in [
+        (Inputs::NONE, None),
+        (Inputs::NONE.accept(Input::Laser), Some(Reason::Silent)),
+        (Inputs::NONE.accept(Input::Depth), None),
+    ] {
+        let mut monitor = monitor();
+        for index in 0..3 {
+            let depth = Some(depth_at(index, 0.0, 0.0));
+            let frame = frame(index, EgoMotion::at_rest(0.1), depth, None).with_expected(expected);
+            monitor.update(&frame, &frame.motion, &[], None);
+        }
+        assert_eq!(monitor.stop_reason(0.5), reason, "{expected:?}");
+    }
+    let expected = Inputs::NONE.accept(Input::Depth);
+    let mut monitor = monitor();
+    for index in 0..3 {
+        let scan = Some(scan_at(index, 0.0, 0.0, |_| None));
+        let frame = frame(index, EgoMotion::at_rest(0.1), None, scan).with_expected(expected);
+        monitor.update(&frame, &frame.motion, &[], None);
+    }
+    assert_eq!(monitor.stop_reason(0.5), Some(Reason::Silent), "the camera");
+}
+
+/// A level scanner above `top_m` sees none of what could be in the way: alone it is no eye, and beside a
+/// camera it does not say that a dark part of its image is free.
+#[test]
+fn a_scanner_above_the_robot_does_not_see_the_way() {
+    for (height_m, nods_rad, range_m, reason) in [
+        (1.4, 0.0, 5.0, None),
+        (1.9, 0.0, 5.0, Some(Reason::Blind)),
+        (1.9, 0.0, f64::INFINITY, Some(Reason::Blind)),
+        (1.9, 0.3, 5.0, None),
+        (1.9, 0.3, f64::INFINITY, None),
+    ] {
+        let mut monitor = monitor();
+        for index in 0..3 {
+            let scan = scan_of(nodding(height_m, nods_rad), [range_m; 360]);
+            let frame = frame(index, EgoMotion::at_rest(0.1), None, Some(scan));
+            monitor.update(&frame, &frame.motion, &[], None);
+        }
+        assert_eq!(monitor.stop_reason(0.5), reason, "{height_m} m {nods_rad} rad {range_m} m");
+    }
+    let settings = CollisionMonitorSettings::default();
+    for (height_m, looks) in [(1.4, true), (1.9, false)] {
+        let empty = LaserScan::of_points(Vec::new()).with_scanner(nodding(height_m, 0.0));
+        assert_eq!(Coverage::of_scan(&settings, &empty, 0.3).looks(), looks, "{height_m} m");
+    }
+}
+
+#[test]
+fn a_further_scanner_that_never_delivers_is_silent() {
+    let mut monitor = monitor();
+    let mut reasons = Vec::new();
+    for index in 0..4 {
+        let further = (index == 3).then(|| scan_at(index, 0.0, 0.0, |_| None));
+        let depth = Some(depth_at(index, 0.0, 0.0));
+        let frame = frame(index, EgoMotion::at_rest(0.1), depth, None)
+            .with_sensor(FurtherScans(Arc::new([further])));
+        monitor.update(&frame, &frame.motion, &[], None);
+        reasons.push(monitor.stop_reason(0.5));
+    }
+    assert_eq!(reasons, [Some(Reason::Silent), Some(Reason::Silent), Some(Reason::Silent), None]);
 }
