@@ -145,7 +145,7 @@ impl PoseBuffer {
         let pairs = self.poses.iter().zip(self.poses.iter().skip(1));
         pairs.filter(|(a, b)| a.0 < to && from < b.0).any(|(a, b)| {
             let step_m = (b.1.translation.vector - a.1.translation.vector).norm();
-            let turned_rad = a.1.rotation.angle_to(&b.1.rotation);
+            let turned_rad = a.1.rotation.angle_to(&b.1.rotation).abs();
             (step_m > MAX_ODOMETRY_STEP_M || turned_rad > MAX_ODOMETRY_STEP_RAD)
                 // A large step over a gap may be real motion.
                 && b.0.seconds_since(a.0) <= MAX_ODOMETRY_GAP_S

@@ -77,7 +77,7 @@ impl FrameMaker {
         let Some((then, before)) = previous else { return (EgoMotion::at_rest(0.0), false) };
         let dt_s = stamp.seconds_since(then);
         let step_m = (here.translation.vector - before.translation.vector).norm();
-        let turned_rad = before.rotation.angle_to(&here.rotation);
+        let turned_rad = before.rotation.angle_to(&here.rotation).abs();
         let is_large = step_m > MAX_ODOMETRY_STEP_M || turned_rad > MAX_ODOMETRY_STEP_RAD;
         // After a long gap a large step may be real motion.
         if is_large && (0.0..=MAX_ODOMETRY_GAP_S).contains(&dt_s) {
@@ -338,6 +338,8 @@ mod tests {
         let jumped = jumped.unwrap();
         assert!(jumped.odometry_jumped);
         assert_eq!(jumped.motion.turn, 0.0, "the motion is unknown");
+        let back = maker.at(at(1.3)).pose(Isometry2::new(Vector2::zeros(), 0.1)).frame();
+        assert!(back.unwrap().odometry_jumped, "to the right");
     }
 
     #[test]
