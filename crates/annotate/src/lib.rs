@@ -38,6 +38,7 @@ use clap::Args;
 use tagalong_app::choice::fitting;
 use tagalong_app::config_file::ConfigFile;
 use tagalong_app::input_args::InputArgs;
+use tagalong_app::lacking::Lacking;
 use tagalong_app::outcome::{Ended, Failure, Outcome, make_room_for, print, say};
 use tagalong_app::progress::Progress;
 use tagalong_app::scoring::annotated_file;
@@ -219,14 +220,24 @@ impl Material {
         let inputs = inputs.accept(Input::Colour).accept(Input::Depth);
         let mut source = FrameSource::open(&args.log, &outer.input, &outer.limits, inputs)?;
         let mut pass = Pass::new()?;
+        let mut lacking = Lacking::default();
         let progress = Progress::new();
         while let Some(item) = source.next_frame() {
             if signals.received().is_some() {
                 break;
             }
-            let report = pipeline.as_mut().map(|pipeline| pipeline.step(&item.frame)).transpose();
-            pass.take(&item, report.map_err(Failure::failed)?.as_ref())?;
+            let report = match &mut pipeline {
+                Some(pipeline) => lacking.step(pipeline, &item.frame).map_err(Failure::failed)?,
+                None => None,
+            };
+            pass.take(&item, report.as_ref())?;
             progress.advance(source.progress(), item.frame.index);
+        }
+        if let Some(error) = lacking.failure() {
+            return Err(Failure::failed(error));
+        }
+        for warning in lacking.warnings() {
+            say(&format!("warning: {warning}; no boxes are proposed there"));
         }
         let proposer = proposing.as_ref().map(ConfigFile::stem).unwrap_or_default();
         let Pass { film, tracks, .. } = pass;

@@ -8,6 +8,7 @@ use tagalong_log::{FrameSource, Input, InputAccount, Inputs, Inspection, Limits}
 use crate::config_file::{ConfigFile, OuterSettings};
 use crate::input_args::InputArgs;
 use crate::installed::{NETWORK, missing_network};
+use crate::lacking::Lacking;
 use crate::misfit::Traits;
 use crate::outcome::Failure;
 
@@ -328,8 +329,12 @@ fn reason(log: &Path, why: &Failure) -> String {
     reason.replacen(&format!("`{log}` "), "the log ", 1).replacen(&format!("`{log}`: "), "", 1)
 }
 
-/// Runs a pipeline on the first frame of a log; returns false if the height or the pitch of the
-/// camera is outside of the range of the config.
+/// Largest number of frames of which the first that has all inputs is tried: a scanner may start after
+/// the camera.
+const TRIED_FRAMES: usize = 30;
+
+/// Runs a pipeline on the first frame of a log that has its inputs; returns false if the height or the
+/// pitch of the camera is outside of the range of the config.
 fn try_config(
     config: &ConfigFile,
     log: &Path,
@@ -374,10 +379,18 @@ fn try_config(
         .into());
     }
     let is_suited = Traits::of(&source).misfits(&settings.suits).is_empty();
-    match pipeline.step(&item.frame) {
-        Ok(_) => Ok(is_suited),
-        Err(error) => Err(Misfit { why: Failure::failed(error), required }),
+    let mut lacking = Lacking::default();
+    let mut next = Some(item);
+    for _ in 0..TRIED_FRAMES {
+        let Some(item) = next else { break };
+        match lacking.step(&mut pipeline, &item.frame) {
+            Ok(Some(_)) => return Ok(is_suited),
+            Ok(None) => next = source.next_frame(),
+            Err(error) => return Err(Misfit { why: Failure::failed(error), required }),
+        }
     }
+    let why = lacking.failure().map_or_else(|| "no frame".to_owned(), ToString::to_string);
+    Err(Misfit { why: Failure::failed(why), required })
 }
 
 #[cfg(test)]

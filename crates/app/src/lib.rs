@@ -24,6 +24,7 @@ pub mod format;
 pub mod frame_notes;
 pub mod input_args;
 pub mod installed;
+pub mod lacking;
 pub mod misfit;
 pub mod missed;
 pub mod origin;

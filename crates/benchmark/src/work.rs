@@ -6,6 +6,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressStyle};
+use tagalong_app::lacking::Lacking;
 use tagalong_app::missed::{Depths, Rules, Witness};
 use tagalong_app::outcome::{Failure, say};
 use tagalong_app::progress::Forecast;
@@ -296,8 +297,13 @@ impl Desk<'_> {
         let mut timings = Vec::new();
         for ((ready, lane), witness) in group.iter().zip(lanes).zip(witnesses) {
             let told = (&witness, &remedies);
+            let warnings = lane.lacking.warnings();
             let (result, timing) = lane.finish(&ready.task, &truth, &shots, lost, told);
-            stored.push(Stored { notes: notes.clone(), ..result });
+            let mut notes = notes.clone();
+            notes.extend(
+                warnings.iter().map(|warning| format!("{}: {warning}", ready.task.pipeline)),
+            );
+            stored.push(Stored { notes, ..result });
             timings.push(timing);
         }
         illustrate(&group[0], &mut stored)?;
@@ -349,6 +355,8 @@ pub struct Lane {
     pub pipeline: Result<Pipeline, String>,
     /// Its reports so far.
     pub watch: Watch,
+    /// Frames that it left out for want of an input.
+    pub lacking: Lacking,
 }
 
 impl Lane {
@@ -359,23 +367,31 @@ impl Lane {
             Ok(Err(failure)) => Err(failure.message),
             Err(_) => Err("a plugin panicked while the pipeline was built".into()),
         };
-        Self { pipeline, watch: Watch::default() }
+        Self { pipeline, watch: Watch::default(), lacking: Lacking::default() }
     }
 
-    /// Passes the next frame to the pipeline, and returns its report. A pipeline that failed gets
-    /// no more frames.
+    /// Passes the next frame to the pipeline, and returns its report; `None` for a frame that lacks an
+    /// input. A pipeline that failed gets no more frames.
     pub fn step(&mut self, item: &LogFrame) -> Option<FrameReport> {
         let pipeline = self.pipeline.as_mut().ok()?;
-        match pipeline.step(&item.frame) {
+        match self.lacking.step(pipeline, &item.frame) {
             Ok(report) => {
-                self.watch.take(item, &report);
-                Some(report)
+                if let Some(report) = &report {
+                    self.watch.take(item, report);
+                }
+                report
             }
             Err(error) => {
                 self.pipeline = Err(error.to_string());
                 None
             }
         }
+    }
+
+    /// Returns the error that ended the pipeline, or that no frame had its inputs.
+    pub fn failure(&self) -> Option<String> {
+        let lacking = self.lacking.failure().map(ToString::to_string);
+        self.pipeline.as_ref().err().cloned().or(lacking)
     }
 
     fn finish(
@@ -386,9 +402,9 @@ impl Lane {
         lost: bool,
         (witness, remedies): (&Witness, &Remedies),
     ) -> Kept {
-        let pipeline = match &self.pipeline {
-            Ok(pipeline) => pipeline,
-            Err(why) => return failed(task, why),
+        let pipeline = match (&self.pipeline, self.failure()) {
+            (Ok(pipeline), None) => pipeline,
+            (_, why) => return failed(task, &why.unwrap_or_default()),
         };
         let rules = Rules { remedies, config: pipeline.config().values() };
         let hash = task.hash.clone();

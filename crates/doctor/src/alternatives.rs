@@ -2,6 +2,7 @@
 
 use tagalong_app::choice::fitting;
 use tagalong_app::config_file::ConfigFile;
+use tagalong_app::lacking::Lacking;
 use tagalong_app::progress::Progress;
 use tagalong_app::remedies::{Change, Remedies, is_present};
 use tagalong_config::Registry;
@@ -21,6 +22,7 @@ struct Runner {
     change: String,
     pipeline: Pipeline,
     course: Course,
+    lacking: Lacking,
 }
 
 /// Tries other settings on the frames of a visit.
@@ -40,6 +42,7 @@ pub fn tried(visit: &Visit, scope: Scope, registry: &Registry) -> Vec<Alternativ
         runners.retain_mut(|runner| runner.step(&item));
         progress.advance(frames.progress(), number);
     }
+    runners.retain(|runner| runner.lacking.failure().is_none());
     let judged = runners.into_iter().map(|runner| Alternative {
         change: runner.change,
         coverage: Coverage::of(&runner.course, &visit.scenery),
@@ -57,16 +60,17 @@ pub fn ranked(alternatives: impl Iterator<Item = Alternative>) -> Vec<Alternativ
 impl Runner {
     fn new(change: String, mut pipeline: Pipeline) -> Self {
         pipeline.share_findings();
-        Self { change, pipeline, course: Course::default() }
+        Self { change, pipeline, course: Course::default(), lacking: Lacking::default() }
     }
 
-    /// Passes a frame to the pipeline; returns false after an error.
+    /// Passes a frame to the pipeline; returns false after an error. A frame that lacks an input is left
+    /// out.
     fn step(&mut self, item: &LogFrame) -> bool {
-        let report = self.pipeline.step(&item.frame);
-        report.is_ok_and(|report| {
+        let Ok(report) = self.lacking.step(&mut self.pipeline, &item.frame) else { return false };
+        if let Some(report) = report {
             self.course.take(&report, &item.odom_from_robot);
-            true
-        })
+        }
+        true
     }
 }
 

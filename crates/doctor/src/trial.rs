@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use tagalong_app::lacking::Lacking;
 use tagalong_app::missed::{Depths, Witness};
 use tagalong_core::{Frame, Funnel, RgbImage};
 use tagalong_geometry::Rect;
@@ -38,7 +39,9 @@ pub struct Trial {
     pub examples: BTreeMap<&'static str, Spread<Example>>,
     /// Reports of all frames, if pictures of them may be needed.
     pub reports: Vec<FrameReport>,
-    /// Error of the plugin that ended the run.
+    /// Frames that it left out for want of an input.
+    pub lacking: Lacking,
+    /// Error that ended the run.
     pub failure: Option<String>,
 }
 
@@ -48,11 +51,18 @@ impl Trial {
         if self.failure.is_some() {
             return;
         }
-        self.frames += 1;
-        match pipeline.step(&item.frame) {
-            Ok(report) => self.take(item, report, with_pictures),
+        match self.lacking.step(pipeline, &item.frame) {
+            Ok(Some(report)) => self.take(item, report, with_pictures),
+            Ok(None) => return,
             Err(error) => self.failure = Some(error.to_string()),
         }
+        self.frames += 1;
+    }
+
+    /// Ends the run: it has failed if no frame had the inputs of the pipeline.
+    pub fn end(&mut self) {
+        let lacking = self.lacking.failure().map(ToString::to_string);
+        self.failure = self.failure.take().or(lacking);
     }
 
     /// Returns the number of confirmed tracks that were seen in the last frame.

@@ -170,6 +170,7 @@ fn look(
         }
         progress.show(frames.progress(), number, out.trial.in_view());
     }
+    out.trial.end();
     out.inspection.counters = frames.counters().clone();
     out.inspection.notes = frames.notes().to_vec();
     out.inspection.data_lost = frames.data_lost();

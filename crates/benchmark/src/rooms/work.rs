@@ -299,7 +299,9 @@ fn figures(
     truth: &TruthFile,
     shots: &Shots,
 ) -> Result<Figures, String> {
-    lane.pipeline?;
+    if let Some(why) = lane.failure() {
+        return Err(why);
+    }
     let blank = TaskResult { log: log.name.clone(), ..TaskResult::default() };
     let (result, _) = lane.watch.score(truth, shots, blank, None)?;
     let scores = result.image.or(result.metres).ok_or("its truth cannot be compared")?;

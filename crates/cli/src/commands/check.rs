@@ -5,6 +5,7 @@ use crate::run::cannot_steer;
 use tagalong::logs::sources_of;
 use tagalong_app::config_file::{ConfigFile, OuterSettings};
 use tagalong_app::format::Format;
+use tagalong_app::lacking::Lacking;
 use tagalong_app::misfit::Traits;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print};
 use tagalong_app::suggest::check_log_path;
@@ -143,6 +144,7 @@ fn fits(
     let mut source = FrameSource::open(log, &outer.input, &outer.limits, pipeline.inputs())?;
     pipeline.check_sources(sources_of(&source)).map_err(|why| cannot_steer(file, log, &why))?;
     let mut tried = 0;
+    let mut lacking = Lacking::default();
     let mut blind_zone = None;
     let mut cautions = Vec::new();
     while tried < FRAMES
@@ -150,8 +152,11 @@ fn fits(
     {
         blind_zone = pipeline.blind_zone(&item.frame.camera);
         cautions = pipeline.cautions(Some(&item.frame.camera));
-        pipeline.step(&item.frame).map_err(Failure::failed)?;
-        tried += 1;
+        let report = lacking.step(&mut pipeline, &item.frame).map_err(Failure::failed)?;
+        tried += u64::from(report.is_some());
+    }
+    if let Some(error) = lacking.failure() {
+        return Err(Failure::failed(error));
     }
     // A log that opens but yields no frame is no fit.
     if tried == 0 {
@@ -159,7 +164,8 @@ fn fits(
     }
     let used = source.account().topics.iter().filter(|topic| topic.used_as.is_some());
     let topics = used.map(ToString::to_string).collect();
-    let notes = source.notes().to_vec();
+    let mut notes = source.notes().to_vec();
+    notes.extend(lacking.warnings());
     let traits = Traits::of(&source);
     Ok(Fit { topics, notes, data_lost: source.data_lost(), traits, blind_zone, cautions })
 }

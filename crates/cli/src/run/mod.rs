@@ -5,7 +5,6 @@ mod choice;
 mod each_camera;
 mod frames;
 mod images;
-mod lacking;
 mod pace;
 mod pictures;
 mod report;
@@ -18,7 +17,6 @@ use std::time::Instant;
 
 pub use args::{Overlaid, RunArgs};
 use frames::{Frames, Item};
-use lacking::Lacking;
 use pace::Pace;
 use pictures::Pictures;
 use report::{FileFacts, RunReport, Tally};
@@ -28,6 +26,7 @@ use tagalong_app::choice::uses_camera;
 use tagalong_app::config_file::{ConfigFile, OuterSettings, refused_log};
 use tagalong_app::format::Format;
 use tagalong_app::frame_notes::{FRAME_NOTES_TOPIC, FrameNotes};
+use tagalong_app::lacking::Lacking;
 use tagalong_app::misfit::{COMPARE, Traits, misfit_note};
 use tagalong_app::origin::Origin;
 use tagalong_app::outcome::{Ended, Failure, Outcome, print, refused, say};
@@ -270,12 +269,10 @@ fn work(
         pace.wait_for(item.frame.frame.stamp, signals);
         desk.timings.add("read", ms_since(waiting));
         desk.tally.read(item.frame.odom_stale);
-        let report = match pipeline.step(&item.frame.frame) {
-            Ok(report) => report,
-            Err(error) => match desk.lacking.count(error) {
-                Ok(()) => continue,
-                Err(error) => return Ok(Some(error)),
-            },
+        let report = match desk.lacking.step(pipeline, &item.frame.frame) {
+            Ok(Some(report)) => report,
+            Ok(None) => continue,
+            Err(error) => return Ok(Some(error)),
         };
         let people = report.tracks.iter().filter(|track| track.confirmed && track.seen).count();
         progress.show(item.progress, report.index, people);
@@ -406,10 +403,10 @@ impl Desk {
         signals: &Signals,
     ) -> Outcome {
         self.tally.fill(&mut report);
-        // A pipeline that processed no frame for want of an input has failed.
-        if report.frames.processed == 0 && signals.received().is_none() {
-            stopped = stopped.or(self.lacking.first_error());
+        if signals.received().is_none() {
+            stopped = stopped.or_else(|| self.lacking.failure().cloned());
         }
+        let warnings = self.lacking.warnings();
         report.lacking = self.lacking.into_groups();
         report.frames.lacking = report.lacking.iter().map(|group| group.frames).sum();
         describe_source(&mut report, source);
@@ -419,7 +416,7 @@ impl Desk {
         let is_empty = report.frames.read == 0 && signals.received().is_none();
         if report.frames.processed == 0 && (stopped.is_some() || is_empty) {
             self.log.discard()?;
-            return verdict(args, &report, stopped, signals, &self.remedies);
+            return verdict(args, &report, &warnings, stopped, signals, &self.remedies);
         }
         let times = to_json("timings.json", &self.timings.summary())?;
         let json = to_json("report.json", &report)?;
@@ -434,7 +431,7 @@ impl Desk {
                 print(&summary::text(&report, &self.timings, period_ms, &folder, args))?;
             }
         }
-        verdict(args, &report, stopped, signals, &self.remedies)
+        verdict(args, &report, &warnings, stopped, signals, &self.remedies)
     }
 }
 
@@ -483,6 +480,7 @@ fn no_frame(report: &RunReport, args: &RunArgs) -> String {
 fn verdict(
     args: &RunArgs,
     report: &RunReport,
+    warnings: &[String],
     stopped: Option<StepError>,
     signals: &Signals,
     remedies: &Remedies,
@@ -490,10 +488,8 @@ fn verdict(
     for note in &report.notes {
         say(&format!("note: {note}"));
     }
-    if report.frames.processed > 0 {
-        for group in &report.lacking {
-            say(&format!("warning: {}", group.warning(report.frames.read)));
-        }
+    for warning in warnings {
+        say(&format!("warning: {warning}"));
     }
     match stopped {
         // The error is the plugin's, and the results before it are written.

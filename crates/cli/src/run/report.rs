@@ -1,11 +1,10 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
+use tagalong_app::lacking::LackingFrames;
 use tagalong_core::Funnel;
 use tagalong_log::InputAccount;
 use tagalong_pipeline::{Fate, FrameReport, Outcome};
-
-use super::lacking::LackingFrames;
 
 /// `report.json`: results of a run, and its dropped candidates with the reasons. Two runs of the
 /// same log, config and seed give the same bytes.

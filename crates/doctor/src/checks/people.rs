@@ -25,24 +25,37 @@ pub fn people(evidence: &Evidence) -> Option<Finding> {
     let tracks = coverage.moving + coverage.still + coverage.unclear;
     let frames = trial.frames;
     let with = coverage.frames_with_people;
-    let measured =
+    let mut measured =
         format!("{}, seen in {with} of {}", counted(tracks, "track"), counted(frames, "frame"));
+    let warnings = trial.lacking.warnings();
+    for warning in &warnings {
+        measured += &format!("; {warning}");
+    }
     let severity = match (frames, with) {
         (0, _) => Severity::Bad,
-        (_, 1..) => Severity::Ok,
+        (_, 1..) if warnings.is_empty() => Severity::Ok,
+        (_, 1..) => Severity::Warn,
         (..FEW_FRAMES, 0) => Severity::Unknown,
         _ => Severity::Warn,
     };
     let remedy = match frames {
         0 => "see the findings above",
+        _ if with > 0 => {
+            "record every input throughout, or take a config without the one that is lacking"
+        }
         _ => {
             "see the findings above; then the funnel below, from the top: -o DIR draws what each \
              test dropped, and --frames N takes more frames"
         }
     };
+    let why = match (frames, with) {
+        (0, _) => "no frame can be made",
+        (_, 0) => "nobody is detected",
+        _ => "a frame without a required input is left out",
+    };
     let finding = Finding::new("people", severity, measured)
         .figure("people", tracks as f64)
         .figure("frames_with_people", with as f64)
-        .why(if frames == 0 { "no frame can be made" } else { "nobody is detected" });
+        .why(why);
     Some(finding.remedy(remedy))
 }

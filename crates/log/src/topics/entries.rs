@@ -331,11 +331,30 @@ fn with_remedy(why: String) -> Reason {
     }
 }
 
+/// Returns the reason for a topic of which no message can be decoded.
+fn mismatched(messages: u64) -> String {
+    match messages {
+        1 => "its only message does not match its type".to_owned(),
+        _ => format!("its {messages} messages do not match their type"),
+    }
+}
+
 /// Returns the reason for a topic without any readable message.
 fn empty(topic: &Topic) -> Option<Reason> {
     if topic.count == 0 {
         return Some(("no message was recorded".to_owned(), None));
     }
     let is_lost = topic.undecodable == topic.count;
-    is_lost.then(|| (format!("its {} messages do not match their type", topic.count), None))
+    is_lost.then(|| (mismatched(topic.count), None))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_message_is_told_in_the_singular() {
+        assert_eq!(mismatched(1), "its only message does not match its type");
+        assert_eq!(mismatched(2), "its 2 messages do not match their type");
+    }
 }

@@ -1,9 +1,9 @@
 //! Frames that lack an input which a plugin requires: left out and counted.
 
 use serde::Serialize;
-use tagalong_core::Input;
+use tagalong_core::{Frame, Input};
 use tagalong_math::counted;
-use tagalong_pipeline::StepError;
+use tagalong_pipeline::{FrameReport, Pipeline, StepError};
 
 /// Frames without an input that a plugin or a stage requires.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -22,7 +22,7 @@ pub struct LackingFrames {
 
 impl LackingFrames {
     /// Returns the warning about them, with the number of all frames that were read.
-    pub fn warning(&self, read: u64) -> String {
+    fn warning(&self, read: u64) -> String {
         let Self { plugin, first_frame, frames, kind, .. } = self;
         format!(
             "{frames} of {} left out, the first is frame {first_frame}: they lack {kind}, which `{plugin}` \
@@ -32,16 +32,38 @@ impl LackingFrames {
     }
 }
 
-/// Counts of a run.
+/// Counts of the frames that one pipeline was given.
 #[derive(Default)]
 pub struct Lacking {
     groups: Vec<LackingFrames>,
     first: Option<StepError>,
+    given: u64,
+    taken: u64,
 }
 
 impl Lacking {
+    /// Passes a frame of a log to the pipeline. `None` for a frame that lacks an input: it is left out
+    /// and counted.
+    ///
+    /// # Errors
+    /// A [`StepError`] that stops the pipeline.
+    pub fn step(
+        &mut self,
+        pipeline: &mut Pipeline,
+        frame: &Frame,
+    ) -> Result<Option<FrameReport>, StepError> {
+        self.given += 1;
+        match pipeline.step(frame) {
+            Ok(report) => {
+                self.taken += 1;
+                Ok(Some(report))
+            }
+            Err(error) => self.count(error).map(|()| None),
+        }
+    }
+
     /// Counts a frame. Gives back an error that is not about a missing input.
-    pub fn count(&mut self, error: StepError) -> Result<(), StepError> {
+    fn count(&mut self, error: StepError) -> Result<(), StepError> {
         let StepError::Lacks { plugin, frame, input } = &error else { return Err(error) };
         let known = self.groups.iter_mut().find(|it| it.plugin == *plugin && it.kind == *input);
         match known {
@@ -58,9 +80,18 @@ impl Lacking {
         Ok(())
     }
 
-    /// Returns the error of the first of these frames.
-    pub fn first_error(&self) -> Option<StepError> {
-        self.first.clone()
+    /// Returns the error of the first frame if every frame lacked an input: the pipeline cannot run on
+    /// this log.
+    pub fn failure(&self) -> Option<&StepError> {
+        self.first.as_ref().filter(|_| self.taken == 0)
+    }
+
+    /// Returns the warnings about frames that were left out; none if all were.
+    pub fn warnings(&self) -> Vec<String> {
+        if self.taken == 0 {
+            return Vec::new();
+        }
+        self.groups.iter().map(|group| group.warning(self.given)).collect()
     }
 
     /// Returns the frames by plugin and input, in the order of their first ones.
@@ -85,11 +116,13 @@ mod tests {
         }
         let stopped = StepError::Stopped { frame: 9 };
         assert_eq!(lacking.count(stopped.clone()), Err(stopped));
-        assert_eq!(lacking.first_error(), Some(lacks(3, Input::Laser)));
-        let warnings: Vec<String> =
-            lacking.into_groups().iter().map(|group| group.warning(20)).collect();
+        assert_eq!(lacking.failure(), Some(&lacks(3, Input::Laser)), "no frame was taken");
+        assert_eq!(lacking.warnings(), [""; 0]);
+        lacking.given = 20;
+        lacking.taken = 17;
+        assert_eq!(lacking.failure(), None);
         assert_eq!(
-            warnings,
+            lacking.warnings(),
             [
                 "2 of 20 frames left out, the first is frame 3: they lack laser scans, which `legs` needs",
                 "1 of 20 frames left out, the first is frame 5: they lack depth images, which `legs` needs",
