@@ -404,7 +404,7 @@ impl Verifier for LeastDepth {
 
 #[test]
 fn plugins_see_no_wrong_pixels_and_the_controller_does() {
-    let depth = DepthImage::from_fn(98, 98, |x, y| if x % 9 + y % 9 == 16 { 0.5 } else { 2.0 });
+    let depth = DepthImage::from_fn(640, 480, |x, y| if x % 9 + y % 9 == 16 { 0.5 } else { 2.0 });
     let noisy = frame(1).with_depth(Arc::new(depth));
     let mut parts = parts();
     parts.detectors = vec![Script::of([person(3.0, 0.0)]).slot(&[Role::Discover])];

@@ -1,15 +1,18 @@
 //! Wrong pixels, as a bad sensor, cable or decoder leaves them: single ones that are like none of their
 //! eight neighbours.
 
+use std::ops::Range;
 use std::sync::Arc;
 
-use tagalong_core::{DepthImage, Derived, Frame, Image, Input, Result, RgbImage};
+use tagalong_core::{DepthImage, Derived, Frame, Image, Images, Input, Result, RgbImage};
 
 /// An image is cleaned if it has more than one wrong pixel in this number. Recordings have at most one in
 /// 2,500, mostly of thin lines and letters.
 const FEW: usize = 500;
-/// Of the rows each one of this number is searched for wrong pixels.
-const ROW_STEP: usize = 4;
+/// Of the rows each one of this number is searched for wrong pixels ...
+const ROW_STEP: usize = 16;
+/// ... which must be at least so many, because small images have few pixels there.
+const LEAST_WRONG: usize = 16;
 /// Least difference of a wrong pixel's intensity from those of its neighbours.
 const LEAST_INTENSITY: u8 = 40;
 /// Least difference of a wrong reading's inverse depth from those of its neighbours, as a fraction of
@@ -18,7 +21,8 @@ const LEAST_SHARE: f32 = 1.0 / 8.0;
 /// ... and in 1/m: the noise of a sensor is the same at all ranges, but the inverse depth is small far
 /// away.
 const LEAST_INVERSE: f32 = 0.03;
-/// Least number of neighbours with a reading for a hole to be closed: at a straight edge there are three.
+/// Least number of neighbours with a reading for a hole to be closed, and for a reading to stand out: at a
+/// straight edge there are three.
 const LEAST_READ: usize = 4;
 
 /// A frame whose colour, intensity and depth images have no wrong pixels.
@@ -41,15 +45,20 @@ impl Derived for Cleaned {
             return Ok(Self(None));
         }
         let mut images = frame.images();
-        let is_noisy = frame.grey().is_ok_and(|grey| has_many(grey, is_wrong_intensity));
-        if is_noisy {
-            images.colour = images.colour.map(|image| Arc::new(cleaned_colour(&image)));
-            images.grey = images.grey.map(|image| Arc::new(changed(&image, cleaned_intensity)));
-        }
-        let noisy_depth = images.depth.take_if(|depth| has_many(depth, is_wrong_reading));
-        let is_changed = is_noisy || noisy_depth.is_some();
-        images.depth = noisy_depth.map(|depth| Arc::new(cleaned_depth(&depth))).or(images.depth);
-        Ok(Self(is_changed.then(|| frame.with_images(images))))
+        let noisy_colour =
+            images.colour.take_if(|colour| has_many(colour, is_like_in_green, is_green_wrong));
+        let noisy_grey = images.grey.take_if(|grey| has_many(grey, is_like, is_wrong_intensity));
+        let noisy_depth = images.depth.take_if(|depth| has_many(depth, is_in_place, stands_out));
+        let is_noisy = noisy_colour.is_some() || noisy_grey.is_some() || noisy_depth.is_some();
+        let images = Images {
+            colour: noisy_colour.map(|image| Arc::new(cleaned_colour(&image))).or(images.colour),
+            grey: noisy_grey
+                .map(|image| Arc::new(changed(&image, cleaned_intensity)))
+                .or(images.grey),
+            depth: noisy_depth.map(|image| Arc::new(cleaned_depth(&image))).or(images.depth),
+            right: None,
+        };
+        Ok(Self(is_noisy.then(|| frame.with_images(images))))
     }
 }
 
@@ -67,35 +76,56 @@ fn cleaned_colour(image: &RgbImage) -> RgbImage {
     })
 }
 
+fn is_like_in_green(pixel: [u8; 3], other: [u8; 3]) -> bool {
+    is_like(pixel[1], other[1])
+}
+
+/// Looks at the green alone, for speed: wrong pixels are black or white, or of any colour.
+fn is_green_wrong((pixel, around): Patch<[u8; 3]>) -> bool {
+    is_wrong_intensity((pixel[1], around.map(|other| other[1])))
+}
+
 fn cleaned_intensity((pixel, around): Patch<u8>) -> u8 {
     if is_wrong_intensity((pixel, around)) { middle(around) } else { pixel }
 }
 
 fn is_wrong_intensity((pixel, around): Patch<u8>) -> bool {
-    let least = around.into_iter().fold(u8::MAX, |least, other| least.min(pixel.abs_diff(other)));
-    least >= LEAST_INTENSITY
+    !around.into_iter().any(|other| is_like(pixel, other))
+}
+
+fn is_like(pixel: u8, other: u8) -> bool {
+    pixel.abs_diff(other) < LEAST_INTENSITY
 }
 
 /// Returns the image without wrong readings and, because they leave some, without holes of one pixel.
 fn cleaned_depth(image: &DepthImage) -> DepthImage {
-    let without =
-        changed(
-            image,
-            |(metres, around)| {
-                if is_wrong_reading((metres, around)) { f32::NAN } else { metres }
-            },
-        );
+    let without = changed(image, |patch| if is_wrong_reading(patch) { f32::NAN } else { patch.0 });
     changed(&without, closed)
+}
+
+/// Returns true for a wrong reading among others. One with few readings around it may be right: of those
+/// of a sparse image, many are alone.
+fn stands_out(patch: Patch<f32>) -> bool {
+    let read = patch.1.into_iter().map(|metres| usize::from(DepthImage::is_reading(metres)));
+    is_wrong_reading(patch) & (read.sum::<usize>() >= LEAST_READ)
 }
 
 /// Returns true for a reading that is on the surface of none of its neighbours.
 fn is_wrong_reading((metres, around): Patch<f32>) -> bool {
-    // No comparison holds for a pixel without a reading.
-    let is_near = around.into_iter().fold(false, |is_near, other| {
-        let most = (0.5 * LEAST_SHARE * (metres + other)).max(LEAST_INVERSE * metres * other);
-        is_near | ((metres - other).abs() < most)
-    });
-    DepthImage::is_reading(metres) & !is_near
+    DepthImage::is_reading(metres)
+        && !around.into_iter().any(|other| are_on_one_surface(metres, other))
+}
+
+/// Returns true for a hole, and for a reading on the surface of its neighbour.
+fn is_in_place(metres: f32, other: f32) -> bool {
+    !DepthImage::is_reading(metres) || are_on_one_surface(metres, other)
+}
+
+/// Returns true for two readings that may be of one surface.
+fn are_on_one_surface(metres: f32, other: f32) -> bool {
+    // The difference of the inverse depths, times both depths. No comparison holds without a reading.
+    let most = (0.5 * LEAST_SHARE * (metres + other)).max(LEAST_INVERSE * metres * other);
+    (metres - other).abs() < most
 }
 
 /// Returns a reading, or for a hole the median of its neighbours, if enough have a reading.
@@ -116,79 +146,81 @@ fn middle(mut around: [u8; 8]) -> u8 {
     around[4]
 }
 
-/// Returns true if more than one pixel in [`FEW`] is wrong.
-fn has_many<P: Copy>(image: &Image<P>, is_wrong: impl Fn(Patch<P>) -> bool) -> bool {
+/// Returns true if more than one pixel in [`FEW`] is wrong, by some of the rows. A pixel that is like the
+/// one on its left, as most are, is not wrong.
+fn has_many<P: Copy>(
+    image: &Image<P>,
+    is_like: impl Fn(P, P) -> bool,
+    is_wrong: impl Fn(Patch<P>) -> bool,
+) -> bool {
     let mut wrong = 0;
     let mut seen = 0;
-    for y in (1..image.height().saturating_sub(1)).step_by(ROW_STEP) {
-        let row = row_of_patches(image, y).map(|patch| usize::from(is_wrong(patch)));
-        wrong += row.sum::<usize>();
-        seen += image.width();
+    for y in inner(image).step_by(ROW_STEP) {
+        let row = image.row(y);
+        for x in 1..row.len() - 1 {
+            if !is_like(row[x], row[x - 1]) && is_wrong(patch(image, x, y)) {
+                wrong += 1;
+            }
+        }
+        seen += row.len();
     }
-    wrong > seen / FEW
+    wrong >= LEAST_WRONG && wrong > seen / FEW
 }
 
 /// Returns the image with `change` applied to each pixel that has eight neighbours.
 fn changed<P: Copy>(image: &Image<P>, change: impl Fn(Patch<P>) -> P) -> Image<P> {
     let mut to = image.clone();
     let width = image.width();
-    for y in 1..image.height().saturating_sub(1) {
-        let row = &mut to.pixels_mut()[y * width..(y + 1) * width];
-        for (pixel, patch) in row.iter_mut().skip(1).zip(row_of_patches(image, y)) {
-            *pixel = change(patch);
+    for y in inner(image) {
+        for x in 1..width - 1 {
+            to.pixels_mut()[y * width + x] = change(patch(image, x, y));
         }
     }
     to
 }
 
-/// Returns the patches of a row that is neither the first nor the last.
-fn row_of_patches<P: Copy>(image: &Image<P>, y: usize) -> impl Iterator<Item = Patch<P>> {
-    let inside = image.width().saturating_sub(2);
-    // Nine rows of equal length: loops over them become vector instructions.
-    let [above, row, below] = [y - 1, y, y + 1].map(|y| {
-        let row = image.row(y);
-        [0, 1, 2].map(|from| row.get(from..from + inside).unwrap_or(&[]))
-    });
-    (0..inside).map(move |x| {
-        let around = [
-            above[0][x],
-            above[1][x],
-            above[2][x],
-            row[0][x],
-            row[2][x],
-            below[0][x],
-            below[1][x],
-            below[2][x],
-        ];
-        (row[1][x], around)
-    })
+/// Returns the rows with pixels that have eight neighbours.
+fn inner<P: Copy>(image: &Image<P>) -> Range<usize> {
+    if image.width() < 3 { 0..0 } else { 1..image.height().saturating_sub(1) }
+}
+
+/// Returns a pixel that has eight neighbours, with them.
+fn patch<P: Copy>(image: &Image<P>, x: usize, y: usize) -> Patch<P> {
+    let above = &image.row(y - 1)[x - 1..x + 2];
+    let row = &image.row(y)[x - 1..x + 2];
+    let below = &image.row(y + 1)[x - 1..x + 2];
+    let around = [above[0], above[1], above[2], row[0], row[2], below[0], below[1], below[2]];
+    (row[1], around)
 }
 
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
-    use tagalong_core::{EgoMotion, GreyImage, Images, RightImage, Stamp};
+    use tagalong_core::{EgoMotion, GreyImage, RightImage, Stamp};
     use tagalong_geometry::{Camera, Pinhole};
     use tagalong_math::{RandomSource, SplitMix64};
 
     use super::*;
 
     fn frame(images: Images) -> Frame {
-        let camera = Camera::mounted(Pinhole::centred(80.0, 96, 64), 96, 64, 1.0, 0.0, 0.0);
+        let camera = Camera::mounted(Pinhole::centred(260.0, 320, 240), 320, 240, 1.0, 0.0, 0.0);
         Frame::new(1, Stamp::default(), Arc::new(camera), EgoMotion::at_rest(0.0), images)
     }
 
     /// A wall at 4 m with a person-sized thing at 2 m before it, and a hole.
     fn depth() -> DepthImage {
-        DepthImage::from_fn(96, 64, |x, y| match (x, y) {
-            (10..20, 10..20) => f32::NAN,
-            (40..60, 16..) => 2.0,
+        DepthImage::from_fn(320, 240, |x, y| match (x, y) {
+            (30..60, 30..60) => f32::NAN,
+            (130..200, 60..) => 2.0,
             _ => 4.0,
         })
     }
 
     fn colour() -> RgbImage {
-        RgbImage::from_fn(96, 64, |x, y| if x < 48 { [90, 60, 200] } else { [y as u8, 180, 30] })
+        RgbImage::from_fn(320, 240, |x, y| match x {
+            ..160 => [90, 60, 200],
+            _ => [(y / 4) as u8, 180, 30],
+        })
     }
 
     /// Returns an image with wrong pixels instead of a share of its own.
@@ -203,7 +235,7 @@ mod tests {
 
     /// The pixels of two images that differ, without the border.
     fn different<P: Copy + PartialEq>(one: &Image<P>, other: &Image<P>) -> usize {
-        let inside = (1..63).flat_map(|y| (1..95).map(move |x| (x, y)));
+        let inside = (1..239).flat_map(|y| (1..319).map(move |x| (x, y)));
         inside.filter(|(x, y)| one.get(*x, *y) != other.get(*x, *y)).count()
     }
 
@@ -211,7 +243,8 @@ mod tests {
     fn an_image_with_wrong_pixels_becomes_the_one_without() {
         let white = salted(&colour(), 0.02, |_| [255; 3]);
         let noisy = salted(&depth(), 0.02, |random| random.between(0.5, 8.0) as f32);
-        assert!(different(&white, &colour()) > 90);
+        let wrong = different(&white, &colour());
+        assert!(wrong > 1000, "{wrong}");
         let images = Images {
             colour: Some(Arc::new(white)),
             depth: Some(Arc::new(noisy)),
@@ -222,17 +255,18 @@ mod tests {
         let clean = cleaned.frame().unwrap();
         // Two wrong pixels side by side stay.
         let left = different(clean.colour().unwrap(), &colour());
-        assert!(left < 25, "{left} pixels are wrong");
+        assert!(left < wrong / 4, "{left} of {wrong} pixels are wrong");
         // What is no reading differs from itself.
         let holes = depth().pixels().iter().filter(|metres| metres.is_nan()).count();
         let left = different(clean.depth().unwrap(), &depth()) - holes;
-        assert!(left < 25, "{left} readings are wrong");
+        assert!(left < wrong / 4, "{left} readings are wrong");
     }
 
     #[test]
     fn a_clean_image_and_a_stereo_pair_are_not_changed() {
         let mut few = depth();
-        few.pixels_mut()[5 * 96 + 7] = 1.0;
+        // Of a row that is searched: fifteen wrong readings.
+        (0..15).for_each(|at| few.pixels_mut()[17 * 320 + 3 + 7 * at] = 1.0);
         let images = Images {
             colour: Some(Arc::new(colour())),
             depth: Some(Arc::new(few)),
@@ -249,6 +283,14 @@ mod tests {
         assert!(frame(images).derived::<Cleaned>().unwrap().frame().is_none());
     }
 
+    /// Filters for it are in the detectors that need a dense image.
+    #[test]
+    fn an_image_with_half_of_its_readings_is_not_changed() {
+        let sparse = salted(&depth(), 0.5, |_| f32::NAN);
+        let images = Images { depth: Some(Arc::new(sparse)), ..Images::default() };
+        assert!(frame(images).derived::<Cleaned>().unwrap().frame().is_none());
+    }
+
     #[test]
     fn of_two_images_only_the_noisy_one_is_changed() {
         let white = salted(&colour().to_grey(), 0.02, |_| 255);
@@ -262,7 +304,7 @@ mod tests {
         let cleaned = frame.derived::<Cleaned>().unwrap();
         let clean = cleaned.frame().unwrap();
         assert!(std::ptr::eq(clean.depth().unwrap(), &*depth));
-        assert!(different(clean.grey().unwrap(), &white) > 90);
+        assert!(different(clean.grey().unwrap(), &white) > 1000);
     }
 
     #[test]
@@ -271,7 +313,7 @@ mod tests {
         assert_eq!(cleaned_depth(&line), line);
         for (width, height) in [(0, 0), (1, 5), (2, 2), (5, 1)] {
             let image = GreyImage::filled(width, height, 9);
-            assert!(!has_many(&image, |_| true) || width > 2, "{width}x{height}");
+            assert!(!has_many(&image, |_, _| false, |_| true), "{width}x{height}");
             assert_eq!(changed(&image, |_| 0), image);
         }
         // A single reading in a hole is dropped, and a hole at a corner of a surface is not closed.
