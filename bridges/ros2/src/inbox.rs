@@ -117,7 +117,7 @@ pub(crate) fn lasting(arrivals: Vec<Arrival>, speed_limit: &str) -> Vec<Arrival>
 mod tests {
     use super::*;
 
-    /// What is published once and arrives while the node is inactive is not published again.
+    /// Both are published once: a message that arrives while the node is inactive does not come again.
     #[test]
     fn limits_and_static_transforms_outlast_a_rest() {
         let inbox = Inbox::default();
